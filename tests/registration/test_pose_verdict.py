@@ -11,8 +11,7 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
-from groundtie.registration.pose_evidence import PoseEvidence
-from groundtie.registration.pose_verdict import judge_pose
+from groundtie.registration.pose_verdict import PoseEvidence, judge_pose
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 # As wide as any search: half of the input's longer side.

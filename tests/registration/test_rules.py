@@ -51,7 +51,7 @@ from groundtie.registration.evidence import (
     RegistrationEvidence,
     SearchEvidence,
 )
-from groundtie.registration.pose_evidence import PoseEvidence, PoseSurveyEvidence
+from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement_evidence import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence

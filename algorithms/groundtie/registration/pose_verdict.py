@@ -1,18 +1,186 @@
-"""The verdict on a pose: whether it stands out so far that it cannot be chance."""
+"""The verdict on a pose: whether it stands out so far that it cannot be chance.
+
+It rests on the candidates of a search, then on chips all over.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
 from ..context import Context
-from ..matching.pose_survey import POSE_TOLERANCE_PX, survey_pose
-from ..pose.pose import Pose
-from ..pose.rotation_windows import PoseWindows
-from ..pose.search import moved_px
+from ..geometry.accuracy import Common, predict_accuracy
+from ..geometry.estimation import jackknife_spread
+from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
+from ..geometry.limits import SearchLimits
+from ..geometry.misses import Misses
+from ..masks.used import NONE, MaskUsed
+from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from ..matching.survey import SURVEY_RADIUS_PX
+from ..matching.surveys import Surveys
+from ..pose.pose import Pose, PoseFound
+from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, PoseWindows
+from ..pose.search import find_poses, moved_px
 from ..rasters.pair import Image, make_pair
-from .layover import CHIPS_MEAN_OVER_SCATTER
-from .pose_evidence import PoseEvidence, PoseSurveyEvidence
+from ..rasters.patch import Patch
+from .evidence import AGREEMENT, ERROR, POSE, SURVEY, HeldOut, hull_share
+from .layover import CHIPS_MEAN_OVER_SCATTER, mean_of_heights_px
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
 from .verdict import Verdict, decide, judge
+
+
+@dataclass(frozen=True)
+class PoseEvidence:
+    """What is known of a pose.
+
+    Parameters
+    ----------
+    found
+        The poses that a search found, best first.
+    exhaustive
+        Those of an exhaustive search over all rotations, best first.
+    shape
+        Rows and columns of the reference.
+    """
+
+    found: Sequence[PoseFound]
+    exhaustive: Sequence[PoseFound]
+    shape: tuple[int, int]
+
+    stages: ClassVar = (POSE,)
+
+    @classmethod
+    def of(
+        cls,
+        windows: tuple[Patch, Patch],
+        limits: SearchLimits,
+        found: Sequence[PoseFound],
+        exhaustive: bool,
+        context: Context,
+    ) -> PoseEvidence:
+        """Put the candidates of a search beside those of an exhaustive one over all rotations.
+
+        Rotations and shifts beyond the limits measure how high chance is, and may hold a better
+        pose: where the scene repeats, one within small limits is as good as the right one.
+
+        Parameters
+        ----------
+        windows
+            Reference and input.
+        limits
+            Those of the search.
+        found
+            What the search found, best first.
+        exhaustive
+            Whether the search was `find_poses`; it is not repeated if it was over all rotations.
+        context
+            Threads to work in.
+        """
+        everything = found
+        least_radius = DEFAULT_RADIUS_SHARE * max(windows[1].values.shape)
+        is_wide = limits.rotation_deg >= 180 and limits.radius >= least_radius
+        if found and not (exhaustive and is_wide):
+            low, high = limits.scale
+            radius = max(limits.radius, least_radius)
+            wide = SearchLimits(radius, 180.0, (min(low, 0.8), max(high, 1.25)))
+            everything = find_poses(*windows, wide, context)
+        rows, cols = windows[0].values.shape
+        return cls(found, everything, (rows, cols))
+
+    @property
+    def height(self) -> float:
+        """Height of the best exhaustive pose, in robust standard deviations."""
+        return self.exhaustive[0].height if self.exhaustive else 0.0
+
+    @property
+    def rival_ratio(self) -> float | None:
+        """Its height over that of the best one elsewhere; None if there is none."""
+        if len(self.exhaustive) < 2:
+            return None
+        return self.exhaustive[0].height / self.exhaustive[1].height
+
+    @property
+    def apart_px(self) -> float:
+        """By how much the found pose moves the reference's corners against the exhaustive one."""
+        return moved_px(self.exhaustive[0].pose, self.found[0].pose, self.shape)
+
+    def summary(self) -> dict[str, Any]:
+        """Return how high the pose stands, as values that JSON can carry."""
+        return {"height": self.height, "rival_ratio": self.rival_ratio}
+
+
+@dataclass(frozen=True)
+class PoseSurveyEvidence:
+    """What chips all over a pair show of a pose that a search found.
+
+    Parameters
+    ----------
+    found
+        What they show.
+    layover_factor
+        See `RegistrationEvidence`.
+    is_shift
+        Whether the pose neither rotates nor scales, as far as chips show.
+    """
+
+    found: PoseSurvey
+    layover_factor: float | None = None
+    is_shift: bool = False
+
+    stages: ClassVar = (AGREEMENT, ERROR, SURVEY)
+    judged: ClassVar = "it, and no other pose matches nearly as well"
+    # The pose is what a search found; chips all over are none that it was fitted to.
+    fit_points: ClassVar = 0
+    fit_points_used: ClassVar = 0
+    mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+
+    @property
+    def metres_per_px(self) -> float | None:
+        """Side of a pixel that the chips were matched at; None without georeferencing."""
+        return self.found.grid.metres_per_pixel
+
+    @property
+    def surveys(self) -> Surveys:
+        """What the chips show of the pose."""
+        return self.found.surveys
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How each chip agrees with the pose as the others have it."""
+        misses, total = self._misses, len(self.found.agrees)
+        fold_models, lattice = self.found.fold_models, self.found.grid.lattice()
+        heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
+        return HeldOut.of(
+            "chips all over",
+            misses,
+            total,
+            "the overlap",
+            jackknife_spread(fold_models, lattice),
+            predict_accuracy(fold_models, lattice, misses, Common(2 * heights)),
+            least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
+        )
+
+    @cached_property
+    def _misses(self) -> Misses:
+        is_known = np.isfinite(self.found.residuals_px).all(axis=1)
+        return Misses(
+            self.found.px[is_known].astype(float),
+            self.found.residuals_px[is_known],
+            SURVEY_RADIUS_PX,
+            POSE_TOLERANCE_PX,
+            POSE_TOLERANCE_PX,
+        )
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the overlap outside of the hull of the chips that agree."""
+        grid, agreeing = self.found.grid, self.found.px[self.found.agrees]
+        return 1 - hull_share(agreeing.astype(float), (grid.width, grid.height))
 
 
 def judge_pose(evidence: PoseEvidence) -> Verdict:

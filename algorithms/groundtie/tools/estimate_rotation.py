@@ -19,8 +19,7 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
 from ..rasters.reading import bounded_cache, open_raster
-from ..registration.pose_evidence import PoseEvidence
-from ..registration.pose_verdict import confirm_pose, judge_pose
+from ..registration.pose_verdict import PoseEvidence, confirm_pose, judge_pose
 from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings

@@ -8,7 +8,7 @@ from ..evidence import POSE
 from .rule import WIDER, Rule
 
 if TYPE_CHECKING:
-    from ..pose_evidence import PoseEvidence
+    from ..pose_verdict import PoseEvidence
 
 # A pose: its height over chance, and over the best pose elsewhere. Measured on 29 real pairs (right
 # poses: height ≥ 6.2, ratio ≥ 1.8) and 115 of different places (where the height passed: ratio ≤
