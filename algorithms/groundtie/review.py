@@ -239,7 +239,7 @@ def of_sensor_image(
     """
     with ExitStack() as stack:
         crs = stack.enter_context(open_raster(reference)).grid.crs
-        ground = Ground(dem, datum, None, None)
+        ground = Ground(dem, datum)
         oriented = open_oriented_image(image, rpc, ground, crs, stack, SILENT)
         grid = sensor_grid(oriented.source, oriented.orientation)
         if path is None:

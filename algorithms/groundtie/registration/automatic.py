@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import AUTO
-from ..progress import Progress
+from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
@@ -25,7 +25,7 @@ from .orthorectification import write_orthoimage
 from .pipeline import run
 from .registration import Registration
 from .scene import SceneInfo
-from .sensor_input import Ground, open_sensor_image
+from .sensor_input import Ground, open_oriented_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 from .verdict import Verdict
@@ -103,7 +103,7 @@ def plan_rendered(given: Mapping[str, Any]) -> Iterator[Try]:
 class OrthorectifiedRpc(RefinedRpc):
     """An image with RPCs, orthorectified by RPCs that were refined on the reference."""
 
-    chosen: str = field(default="refine_rpc: the input has RPCs", kw_only=True)
+    chosen: ClassVar = "refine_rpc: the input has RPCs"
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
@@ -207,22 +207,19 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
         refined = folder / "refined_RPC.TXT"
         result = refine({**given, "output": refined}, progress.part(0.0, 0.7))
         _orthorectify(given, refined, output, progress.part(0.7, 1.0))
-    files = {**result.files, "output": str(output)}
-    values = {f.name: getattr(result, f.name) for f in fields(result)}
-    return OrthorectifiedRpc(**{**values, "files": files})
+    return OrthorectifiedRpc(**vars(result) | {"files": {**result.files, "output": str(output)}})
 
 
 def _orthorectify(
     given: Mapping[str, Any], rpc_file: Path, output: Path, progress: Progress
 ) -> None:
-    ground = Ground(given["dem"], given["dem_datum"], None, None)
+    ground = Ground(given["dem"], given["dem_datum"])
     with threads(given["workers"], progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
-        source, rpc = open_sensor_image(given["input"], rpc_file, stack)
         crs = stack.enter_context(open_raster(given["reference"])).grid.crs
-        orientation = ground.orientation(source, rpc, crs, stack)
+        image = open_oriented_image(given["input"], rpc_file, ground, crs, stack, SILENT)
         staged = stack.enter_context(Outputs()).stage(output)
-        write_orthoimage(source, orientation, staged, context)
+        write_orthoimage(image.source, image.orientation, staged, context)
 
 
 # What `refine` takes and the tool `register` does not ask for.

@@ -87,7 +87,8 @@ class Refinement:
         """
         table = points.points
         fitted, checked = table.fit, table.check
-        seen = points.seen_by(image.rpc, image.size)
+        rpc = image.orientation.rpc
+        seen = points.seen_by(rpc, image.size)
         control = seen.take(fitted)
         check = seen.take(checked) if checked.any() else None
         try:
@@ -99,7 +100,7 @@ class Refinement:
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
         needs_spread = not (is_measured and model == SHIFT)
         pixel_m = sensor_grid(image.source, image.orientation).pixel_size_m
-        fit = fold(image.rpc, adjustment.bias)
+        fit = fold(rpc, adjustment.bias)
         evidence = RefinementEvidence.of(
             control,
             adjustment,

@@ -1,4 +1,4 @@
-"""What tools for images with RPCs share: their parameters, and the image oriented by them."""
+"""What tools for images with RPCs share: where heights come from, and the image oriented."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Ground:
 
     dem: Path | None
     datum: str | None
-    geoid: Path | None
-    height_m: float | None
+    geoid: Path | None = None
+    height_m: float | None = None
     least_cover: float = 0.0
 
     def __post_init__(self) -> None:
@@ -54,14 +54,13 @@ class Ground:
                 f"({', '.join(DATUMS)}) or a geoid grid"
             )
 
-    def note(self, rpc: RPC, known_share: float = 1.0) -> str:
+    def note(self, orientation: Orientation) -> str:
         """Return in words which heights are used, and of which share of the image they are."""
         if self.dem is not None:
-            partly = (
-                "" if known_share == 1 else f", which covers {_percent(known_share)} of the image"
-            )
+            share = orientation.known_share
+            partly = "" if share == 1 else f", which covers {_percent(share)} of the image"
             return f"heights of {self.dem} above {self.datum or self.geoid}{partly}"
-        height = rpc.offset[2] if self.height_m is None else self.height_m
+        height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
     def orientation(
@@ -120,16 +119,13 @@ class OrientedImage:
     ----------
     source
         The image, open.
-    rpc
-        Its RPCs.
     orientation
-        How it sees the ground.
+        How it sees the ground, by its RPCs.
     heights
         Which heights are used, in words.
     """
 
     source: RasterSource
-    rpc: RPC
     orientation: Orientation
     heights: str
 
@@ -153,9 +149,9 @@ def open_oriented_image(
     """
     source, rpc = open_sensor_image(image, rpc_file, stack)
     orientation = ground.orientation(source, rpc, crs or utm_of(source, rpc), stack)
-    heights = ground.note(rpc, orientation.known_share)
+    heights = ground.note(orientation)
     progress.update(0.0, heights)
-    return OrientedImage(source, rpc, orientation, heights)
+    return OrientedImage(source, orientation, heights)
 
 
 def utm_of(source: RasterSource, rpc: RPC) -> CRS:

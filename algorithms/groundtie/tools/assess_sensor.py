@@ -110,7 +110,7 @@ def assess_sensor(
         points = points.take(check if check.any() else points.points.used)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points} holds no points that are used")
-        errors = {BEFORE: SensorErrors.of(oriented.rpc, points)}
+        errors = {BEFORE: SensorErrors.of(oriented.orientation.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
         with Outputs() as outputs:

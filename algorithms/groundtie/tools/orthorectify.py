@@ -96,7 +96,7 @@ def orthorectify(
                 raise GeoreferencingError(f"{reference} has no CRS")
         map_crs = grid.crs if grid is not None else _crs(crs) or utm_of(source, model)
         orientation = ground.orientation(source, model, map_crs, stack)
-        heights = ground.note(model, orientation.known_share)
+        heights = ground.note(orientation)
         context.update(0.0, heights)
         staged = stack.enter_context(Outputs()).stage(output)
         target = write_orthoimage(
