@@ -22,7 +22,7 @@ from groundtie.registration.masks import (
     with_ground_mask,
 )
 from groundtie.registration.scene import SceneInfo
-from groundtie.registration.user_masks import UserMask, named_masks, with_user_masks
+from groundtie.registration.user_masks import UserMask, with_user_masks
 
 __all__ = ["context"]
 NO_RADAR = "there is no radar image beside a camera's"
@@ -122,7 +122,7 @@ def test_layers_and_classifiers_become_rasters(
         text = json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]})
         layer.write_text(text)
         classifier = bright_is_left_out(tmp_path / "bright.json", 120.0)
-        both, used = with_user_masks(pair, named_masks((layer, classifier)), stack, context)
+        both, used = with_user_masks(pair, (layer, classifier), stack, context)
         assert used is not None
         assert (used.kind, used.image, used.reason) == (
             LAYER,
@@ -134,12 +134,12 @@ def test_layers_and_classifiers_become_rasters(
         assert valid[:, :199].all() and not valid[:, 201:].any()
         # Nothing of the fields is bright.
         assert both.input_patch(both.grid, both.nominal_px).valid.mean() > 0.9
-        alone, used = with_user_masks(pair, named_masks((classifier, None)), stack, context)
+        alone, used = with_user_masks(pair, (classifier, None), stack, context)
         assert used is None
         shown = alone.reference_patch(alone.grid)
         bright = pair.reference_patch(pair.grid).values
         assert bright[~shown.valid].mean() > 1.5 * bright[shown.valid].mean()
-        same, used = with_user_masks(pair, named_masks((None, None)), stack, context)
+        same, used = with_user_masks(pair, (None, None), stack, context)
         assert same is pair and used is None
 
 

@@ -18,7 +18,7 @@ from groundtie.errors import ParameterError
 from groundtie.rasters.grid import Grid
 from groundtie.registration.asked import asked_masks
 from groundtie.registration.scene import SceneInfo
-from groundtie.registration.user_masks import UserMask, named_masks, with_user_masks
+from groundtie.registration.user_masks import UserMask, with_user_masks
 
 __all__ = ["context"]
 
@@ -43,7 +43,7 @@ def test_values_hide_clouds_and_say_nothing_of_the_ground(
         grid = pair.input.source.grid
         path = half_cloudy(tmp_path / "scl.tif", grid)
         mask = UserMask.of("input.tif", path, "scl")
-        masked, used = with_user_masks(pair, named_masks((None, mask)), stack, context)
+        masked, used = with_user_masks(pair, (None, mask), stack, context)
         valid = masked.input_patch(masked.grid, masked.nominal_px).valid
         middle = valid.shape[1] // 2
         assert valid[5:-5, 5 : middle - 2].all() and not valid[:, middle + 2 :].any()
@@ -69,7 +69,7 @@ def test_a_layer_may_show_what_takes_no_part(
         found = []
         for values in (None, "inside"):
             mask = UserMask.of("input.tif", layer, values)
-            masked, used = with_user_masks(pair, named_masks((mask, None)), stack, context)
+            masked, used = with_user_masks(pair, (mask, None), stack, context)
             found.append(masked.reference_patch(masked.grid).valid)
             assert (used is None) == (values == "inside")
         everything = pair.reference_patch(pair.grid).valid

@@ -16,7 +16,7 @@ from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered
 from .specification import Specification
 from .surface_masks import rendered_surface
-from .user_masks import named_masks, with_user_masks
+from .user_masks import with_user_masks
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def pair_images(
     )
     for note in (*_reach_notes(images, radius_m), *images.notes()):
         context.update(0.0, note)
-    pair, used = with_user_masks(images, named_masks(masks), stack, context.part(0.0, 0.02))
+    pair, used = with_user_masks(images, masks, stack, context.part(0.0, 0.02))
     return OpenPair(images, pair, used, stack, started)
 
 

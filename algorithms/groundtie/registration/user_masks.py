@@ -127,18 +127,8 @@ def _check_values(mask: Any, values: str) -> None:
         raise ParameterError(f"a classifier has no values: {values!r}")
 
 
-def named_masks(masks: tuple[Any, Any]) -> dict[str, UserMask]:
-    """Return the masks of reference and input by "reference" and "input"; None is left out."""
-    named = zip((REFERENCE, INPUT), masks, strict=True)
-    return {
-        name: mask if isinstance(mask, UserMask) else UserMask(mask)
-        for name, mask in named
-        if mask is not None
-    }
-
-
 def with_user_masks(
-    pair: ImagePair, masks: dict[str, UserMask], stack: ExitStack, context: Context
+    pair: ImagePair, masks: tuple[Any, Any], stack: ExitStack, context: Context
 ) -> tuple[ImagePair, MaskUsed | None]:
     """Return a pair with the masks that the user gave.
 
@@ -147,7 +137,7 @@ def with_user_masks(
     pair
         The images.
     masks
-        The masks of the "reference" and of the "input".
+        For the reference and the input a `UserMask`, or what one is made of; None: none.
     stack
         Keeps the masks' rasters until it is closed.
     context
@@ -159,7 +149,10 @@ def with_user_masks(
         The pair, and the mask that a vector layer made, which is one of the ground; None: none.
     """
     used = None
-    for name, mask in masks.items():
+    for name, given in zip((REFERENCE, INPUT), masks, strict=True):
+        if given is None:
+            continue
+        mask = given if isinstance(given, UserMask) else UserMask(given)
         if mask.is_zeros:
             image = replace(getattr(pair, name), mask=stack.enter_context(open_raster(mask.mask)))
             pair = replace(pair, **{name: image})
