@@ -14,6 +14,7 @@ from groundtie.geometry.model_choice import left_out_blocks
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
+from groundtie.matching.check import CHECK_RADIUS_PX
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
@@ -25,7 +26,6 @@ from groundtie.registration.verdict import refusals
 from groundtie.sensor.adjustment import Control, adjust
 
 GRID = utm_grid(600, 500)
-RADIUS = 16
 
 # Pixels of the image whose RPCs are refined.
 IMAGE_SIZE = (1000, 800)
@@ -78,7 +78,7 @@ def scatter(count: int, sigma: float, seed: int = 3) -> np.ndarray:
 
 def fallen(count: int, seed: int = 4) -> np.ndarray:
     """Return errors of matches that fell anywhere, shape (n, 2)."""
-    return np.random.default_rng(seed).uniform(-RADIUS, RADIUS, (count, 2))
+    return np.random.default_rng(seed).uniform(-CHECK_RADIUS_PX, CHECK_RADIUS_PX, (count, 2))
 
 
 def displaced(count: int, low: float, high: float, seed: int = 5) -> np.ndarray:
@@ -100,9 +100,7 @@ def evidence(
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
     surveys = Surveys(survey, rest, ground)
-    return RegistrationEvidence(
-        estimate, check, GRID, max_error_px, RADIUS, surveys=surveys, **more
-    )
+    return RegistrationEvidence(estimate, check, GRID, max_error_px, surveys=surveys, **more)
 
 
 def survey(

@@ -285,9 +285,9 @@ def test_the_ground_of_a_town_is_not_found_in_pixels_of_unknown_size(
 def test_what_chance_explains_with_less_than_its_squared_limit_needs_no_second_pass(
     agreeing: int, is_needed: bool
 ) -> None:
-    """A random match within 16 px lies within 2 px with 4 π / 33²: 5 of 9 do with 10^-7.5."""
+    """A random match within 12 px lies within 2 px with 4 π / 25²: 5 of 9 do with 10^-6.4."""
     errors = np.concatenate([scatter(agreeing, 0.3), np.full((9 - agreeing, 2), 9.0)])
-    probability = 4 * math.pi / 33**2
+    probability = 4 * math.pi / 25**2
     tail = binom.sf(agreeing - 1, 9, probability)
     found = evidence(errors)
     assert found.held_out.log10_chance == pytest.approx(math.log10(tail), abs=1e-6)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
-    RADIUS,
     check_points,
     estimated,
     evidence,
@@ -24,6 +23,7 @@ from groundtie.geometry.models import PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
+from groundtie.matching.check import CHECK_RADIUS_PX
 from groundtie.registration.evidence import (
     AGREEMENT,
     ERROR,
@@ -40,7 +40,7 @@ LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
     estimate = estimate or estimated(fit_points())
-    return judge(RegistrationEvidence(estimate, check, GRID, max_error, RADIUS))
+    return judge(RegistrationEvidence(estimate, check, GRID, max_error))
 
 
 @pytest.mark.parametrize("sigma", [0.2, 0.7, 1.2])
@@ -130,7 +130,7 @@ def test_the_chance_counts_all_check_points_but_only_those_that_agree() -> None:
     verdict = judged(check)
     assert verdict.check_points == 40
     assert verdict.check_points_agreeing == int((~far).sum())
-    probability = agreement_probability(2.0, RADIUS)
+    probability = agreement_probability(2.0, CHECK_RADIUS_PX)
     expected = log10_chance(int((~far).sum()), 40, probability)
     assert verdict.log10_chance == pytest.approx(expected, abs=1e-9)
     assert verdict.chance == pytest.approx(10**expected)
@@ -169,8 +169,8 @@ def test_fit_points_that_were_all_rejected() -> None:
 
 def test_summaries_are_json_whatever_happened() -> None:
     exact = judged(check_points(np.zeros((400, 2))))
-    # A probability of 10^-775 is no number of the machine's, but not a reason to fail either.
-    assert exact.log10_chance == pytest.approx(400 * math.log10(4 * math.pi / 33**2), rel=1e-6)
+    # A probability of 10^-679 is no number of the machine's, but not a reason to fail either.
+    assert exact.log10_chance == pytest.approx(400 * math.log10(4 * math.pi / 25**2), rel=1e-6)
     assert exact.chance == 0.0
     one_fold = estimated(fit_points())
     one_fold = Estimate(one_fold.transform, one_fold.points, one_fold.fold_models[:1])

@@ -24,6 +24,7 @@ from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.used import NONE, MaskUsed
+from ..matching.check import CHECK_RADIUS_PX
 from ..matching.surveys import Surveys
 from ..rasters.grid import FloatArray, Grid
 from .layover import mean_of_heights_px
@@ -224,8 +225,6 @@ class RegistrationEvidence:
         The matching grid, cut to the overlap.
     max_error_px
         Largest root mean square error at check points, in matching pixels.
-    radius_px
-        Radius of the search for check points.
     layover_factor
         How many times what heights scatter matched points by, they displace the model; None: not
         two radar images.
@@ -245,7 +244,6 @@ class RegistrationEvidence:
     check: TiePoints
     grid: Grid
     max_error_px: float
-    radius_px: int
     tries: int = 1
     layover_factor: float | None = None
     scene: SceneInfo | None = None
@@ -313,7 +311,7 @@ class RegistrationEvidence:
     @cached_property
     def _misses(self) -> Misses:
         places = self.grid.map_to_pixel(self.counted.reference_xy)
-        return Misses(places, self.residuals_px, self.radius_px, self.max_error_px)
+        return Misses(places, self.residuals_px, CHECK_RADIUS_PX, self.max_error_px)
 
     @property
     def common(self) -> Common:

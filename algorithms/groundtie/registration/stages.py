@@ -11,7 +11,7 @@ from ..geometry.estimation import Estimate
 from ..geometry.models import TERRAIN, Model, shift_model
 from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
-from ..matching.check import CHECK_RADIUS_PX, Check, check_model
+from ..matching.check import Check, check_model
 from ..matching.chips import ChipMatcher
 from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
@@ -149,7 +149,6 @@ class Stages:
             check.points,
             self.masked.pair.grid,
             self.spec.largest_error_px,
-            CHECK_RADIUS_PX,
             self.spec.tries,
             factor if is_radar else None,
             scene,
