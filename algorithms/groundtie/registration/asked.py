@@ -20,7 +20,6 @@ from .user_masks import UserMask
 USUAL: Mapping[str, Any] = {
     "displacement": None,
     "output_grid": "reference",
-    "resampling": "cubic",
     "mask_values": None,
     "surface_model": None,
     "views": None,
@@ -135,6 +134,8 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
 def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return what of a specification the view of a reference states that is heights; {}: none.
 
+    It is that of a single try, where a radar stands in the west by default.
+
     Raises
     ------
     ParameterError
@@ -143,8 +144,13 @@ def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
     view = asked_surface_view(given)
     if view is not None:
         return {"surface_view": view, "radar": BOTH}
-    light = asked_light(given)
-    return {} if light is None else {"light": light}
+    lights = asked_lights(given)
+    if len(lights) > 1 and lights[0].kind == SUN:
+        raise ParameterError(
+            f"'{_TERRAIN} {SUN}' needs its azimuth, as '{_TERRAIN} {SUN} azimuth=155': the tool "
+            "register tries some"
+        )
+    return {"light": lights[0]} if lights else {}
 
 
 def asked_surface_view(given: Mapping[str, Any]) -> View | None:
@@ -199,20 +205,3 @@ def asked_lights(given: Mapping[str, Any]) -> tuple[Light, ...]:
     kind = found[1]
     azimuths = _AZIMUTHS_DEG[kind] if found[2] is None else (float(found[2]),)
     return tuple(Light(kind, azimuth) for azimuth in azimuths)
-
-
-def asked_light(given: Mapping[str, Any]) -> Light | None:
-    """Return the light of a single try; a radar stands in the west by default.
-
-    Raises
-    ------
-    ParameterError
-        The words state none, or not where the sun stands.
-    """
-    lights = asked_lights(given)
-    if len(lights) > 1 and lights[0].kind == SUN:
-        raise ParameterError(
-            f"'{_TERRAIN} {SUN}' needs its azimuth, as '{_TERRAIN} {SUN} azimuth=155': the tool "
-            "register tries some"
-        )
-    return lights[0] if lights else None

@@ -21,7 +21,7 @@ from .asked import USUAL, asked_masks, specified
 from .displacement import write_displacement
 from .opening import OpenPair, open_pair, pair_images
 from .pipeline import run
-from .registered_output import RegisteredOutput, grid_of_output
+from .registered_output import RegisteredOutput
 from .registration import Registration
 from .specification import Specification
 
@@ -128,8 +128,7 @@ class Call:
         given = {**USUAL, **parameters}
         output = None
         if given["output"] is not None:
-            grid = grid_of_output(given["output"], given["output_grid"])
-            output = RegisteredOutput(given["output"], grid, given["resampling"])
+            output = RegisteredOutput(given["output"], given["output_grid"])
         return cls(
             given["reference"],
             given["input"],

@@ -43,7 +43,7 @@ class RegisteredOutput:
 
     path: Path
     grid: str
-    resampling: str
+    resampling: str = "cubic"
 
     def write(
         self,
@@ -69,7 +69,7 @@ class RegisteredOutput:
             Threads and progress.
         """
         staged, progress = outputs.stage(self.path), context.progress
-        if self.grid == UNTOUCHED or self.path.suffix.lower() == VRT:
+        if grid_of_output(self.path, self.grid) == UNTOUCHED:
             moved = moved_grid(transform)
             if self.path.suffix.lower() == VRT:
                 write_vrt(source, moved, staged)
