@@ -150,7 +150,7 @@ def compare(
     assert pair.truth is not None
     errors = np.hypot(*pair.truth.off_px(on_pixels(found.transform, pair.reference)).T)
     verdict = found.verdict
-    radii = verdict.ce50_px, verdict.check_ce90_px, verdict.ce95_px
+    radii = verdict.accuracy.ce50_px, verdict.check_ce90_px, verdict.accuracy.ce95_px
     return CalibrationRun(
         name,
         group,

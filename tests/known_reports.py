@@ -14,6 +14,7 @@ from affine import Affine
 from html_pages import Page, picture_of
 from raster_files import utm_grid, wave_image, write_raster
 
+from groundtie.geometry.accuracy import Accuracy
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
@@ -44,9 +45,7 @@ ACCEPTED = Verdict(
     log10_chance=-14.2,
     spread_px=0.21,
     extrapolated_share=0.18,
-    ce50_px=0.45,
-    ce95_px=1.2,
-    ce90_range_px=(0.7, 1.4),
+    accuracy=Accuracy(0.45, 0.93, 1.2, (0.7, 1.4)),
 )
 
 

@@ -21,6 +21,7 @@ from benchmarks.calibration import ACCEPTED, CalibrationRun, RealPairCase, Simul
 from benchmarks.optical_pairs import OpticalPair
 from benchmarks.suites import Settings
 from groundtie.errors import NotRegisteredError
+from groundtie.geometry.accuracy import Accuracy
 from groundtie.geometry.transform import load_transform
 from groundtie.registration.verdict import Verdict
 
@@ -43,7 +44,10 @@ class Found:
         truth = load_transform(pair.reference.with_name("truth.json"))
         self.transform = lambda xy: truth(xy) + [off_px, 0]
         self.verdict = Verdict(
-            True, "fine", check_ce90_px=ce90_px, ce50_px=ce90_px / 2, ce95_px=1.2 * ce90_px
+            True,
+            "fine",
+            check_ce90_px=ce90_px,
+            accuracy=Accuracy(ce90_px / 2, ce90_px, 1.2 * ce90_px, (ce90_px, ce90_px)),
         )
 
 

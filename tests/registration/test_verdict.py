@@ -73,8 +73,8 @@ def test_what_all_check_points_share_is_an_error_of_the_transform() -> None:
 
 def test_radii_of_higher_probability_are_larger_and_come_with_an_interval() -> None:
     verdict = judged(check_points(scatter(72, 0.3)))
-    low, high = verdict.ce90_range_px
-    assert verdict.ce50_px < verdict.check_ce90_px < verdict.ce95_px
+    low, high = verdict.accuracy.ce90_range_px
+    assert verdict.accuracy.ce50_px < verdict.check_ce90_px < verdict.accuracy.ce95_px
     assert low < verdict.check_ce90_px < high
 
 
@@ -183,7 +183,8 @@ def test_summaries_are_json_whatever_happened() -> None:
         assert summary["points"] == verdict.points
         more = {"points", "chance", "ce90_low_px", "ce90_high_px"}
         more |= {"ellipse_major_px", "ellipse_minor_px", "ellipse_angle_deg"}
-        assert set(summary) == set(vars(verdict)) - {"ce90_range_px", "ellipse", "is_final"} | more
+        more |= {"ce50_px", "ce95_px", "heights_px"}
+        assert set(summary) == set(vars(verdict)) - {"accuracy", "is_final"} | more
     assert LOST.summary()["check_rmse_px"] is None
     assert NOT_JUDGED.summary()["check_rmse_px"] is None
 

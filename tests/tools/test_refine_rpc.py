@@ -104,7 +104,7 @@ def test_what_displaces_the_match_displaces_the_rpcs(
         dem_datum="ellipsoidal",
         matching_pixel_size=pixel_m,
     )
-    assert found.verdict.heights_px == pytest.approx(3.0, rel=0.1)
+    assert found.verdict.accuracy.heights_px == pytest.approx(3.0, rel=0.1)
     # Nine tenths of what is even up to 3 px, and what other points would have given.
     assert 2.7 < found.verdict.check_ce90_px < 3.5
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..errors import GroundTieError
-from ..geometry.accuracy import UNKNOWN_ELLIPSE, Ellipse
+from ..geometry.accuracy import UNKNOWN, Accuracy
 from .evidence import AGREEMENT, Evidence, EvidenceOfPoints, SearchEvidence
 from .rules import RULES, Rule
 
@@ -44,14 +44,8 @@ class Verdict:
         What a user can try next; empty if it is accepted.
     is_final
         Whether nothing else is tried after it: what is accepted, or refused by such a `Rule`.
-    ce50_px, ce95_px
-        As `check_ce90_px`, with 50 and 95 %.
-    ce90_range_px
-        Interval that holds the radius of 90 %, as it is known from few points only.
-    ellipse
-        The ellipse that holds 90 % of the errors at a random place.
-    heights_px
-        How far heights may displace all points, along its longer axis where that is much.
+    accuracy
+        All that is predicted of the error at a random place, unless it was measured.
     """
 
     accepted: bool
@@ -70,11 +64,7 @@ class Verdict:
     rule: str = ""
     advice: str = ""
     is_final: bool = True
-    ce50_px: float = math.nan
-    ce95_px: float = math.nan
-    ce90_range_px: tuple[float, float] = (math.nan, math.nan)
-    ellipse: Ellipse = UNKNOWN_ELLIPSE
-    heights_px: float = math.nan
+    accuracy: Accuracy = UNKNOWN
 
     @property
     def points(self) -> int:
@@ -92,21 +82,23 @@ class Verdict:
 
     def accuracy_line(self) -> str:
         """Return the predicted error at a random place, with its interval, as a line of text."""
-        low, high = self.ce90_range_px
+        (low, high), ellipse = self.accuracy.ce90_range_px, self.accuracy.ellipse
         ce90 = both_units(self.check_ce90_px, self.check_ce90_m)
         return (
             f"accuracy at a random place: CE90 {ce90}, known to {low:.2f}–{high:.2f} px; 90 % in "
-            f"an ellipse of {self.ellipse.major_px:.2f} × {self.ellipse.minor_px:.2f} px, longer "
-            f"at {self.ellipse.angle_deg:.0f}°, of which heights {self.heights_px:.2f} px"
+            f"an ellipse of {ellipse.major_px:.2f} × {ellipse.minor_px:.2f} px, longer "
+            f"at {ellipse.angle_deg:.0f}°, of which heights {self.accuracy.heights_px:.2f} px"
         )
 
     def summary(self) -> dict[str, Any]:
         """Return the verdict as values that JSON can carry; what is not finite is None."""
-        low, high = self.ce90_range_px
-        values = asdict(self) | {"points": self.points, "chance": self.chance}
+        values = asdict(self)
+        accuracy = values.pop("accuracy")
+        ellipse, (low, high) = accuracy.pop("ellipse"), accuracy.pop("ce90_range_px")
+        values |= accuracy | {"points": self.points, "chance": self.chance}
         values |= {"ce90_low_px": low, "ce90_high_px": high}
-        values |= {f"ellipse_{name}": value for name, value in asdict(self.ellipse).items()}
-        del values["ce90_range_px"], values["ellipse"], values["is_final"]
+        values |= {f"ellipse_{name}": value for name, value in ellipse.items()}
+        del values["ce90_px"], values["is_final"]
         unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
         return {k: None if k in unknown else v for k, v in values.items()}
 
@@ -173,9 +165,5 @@ def judge(evidence: EvidenceOfPoints) -> Verdict:
         check_ce90_m=points.accuracy.ce90_px * metres,
         spread_px=points.spread_px,
         extrapolated_share=evidence.extrapolated_share,
-        ce50_px=points.accuracy.ce50_px,
-        ce95_px=points.accuracy.ce95_px,
-        ce90_range_px=points.accuracy.ce90_range_px,
-        ellipse=points.accuracy.ellipse,
-        heights_px=points.accuracy.heights_px,
+        accuracy=points.accuracy,
     )
