@@ -13,6 +13,7 @@ from evidences import (
     fallen,
     fit_points,
     scatter,
+    scene,
 )
 from raster_files import UTM
 
@@ -40,7 +41,7 @@ LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
     estimate = estimate or estimated(fit_points())
-    return judge(RegistrationEvidence(estimate, check, GRID, max_error))
+    return judge(RegistrationEvidence(estimate, check, GRID, max_error, scene()))
 
 
 @pytest.mark.parametrize("sigma", [0.2, 0.7, 1.2])

@@ -225,11 +225,13 @@ class RegistrationEvidence:
         The matching grid, cut to the overlap.
     max_error_px
         Largest root mean square error at check points, in matching pixels.
+    scene
+        What the images are.
+    tries
+        How many registrations were tried, any of which might agree by chance.
     layover_factor
         How many times what heights scatter matched points by, they displace the model; None: not
         two radar images.
-    scene
-        What the images are; None: unknown, as in tests of other rules.
     mask
         The mask that was used.
     surveys
@@ -244,9 +246,9 @@ class RegistrationEvidence:
     check: TiePoints
     grid: Grid
     max_error_px: float
+    scene: SceneInfo
     tries: int = 1
     layover_factor: float | None = None
-    scene: SceneInfo | None = None
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     surveys: Surveys = field(default_factory=Surveys)
     input_fit: ModelFit | None = None

@@ -9,7 +9,7 @@ from .rule import ON_GROUND, Rule
 
 def _ground_not_found(evidence: ImagesEvidence | RegistrationEvidence) -> str | None:
     scene = evidence.scene
-    if scene is None or evidence.mask.kind in (LAYER, SURFACE):
+    if evidence.mask.kind in (LAYER, SURFACE):
         return None
     if scene.is_despeckled_town:
         return "the radar image of a town has no speckle, by which its ground is found"

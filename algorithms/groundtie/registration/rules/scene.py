@@ -23,7 +23,7 @@ _CLEAR_SHARE = 2 / 3
 
 def _few_on_ground(evidence: RegistrationEvidence) -> str | None:
     scene = evidence.scene
-    if scene is None or evidence.mask.kind != GROUND or not scene.input.is_in_sensor_geometry:
+    if evidence.mask.kind != GROUND or not scene.input.is_in_sensor_geometry:
         return None
     agreeing, has_colours = evidence.held_out.agreeing, scene.other.has_colours
     if agreeing >= (_FEWEST_IN_COLOURS if has_colours else _FEWEST_GREY):
@@ -50,7 +50,7 @@ def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
     points = evidence.held_out
-    if evidence.scene is None or evidence.mask.is_ground or not evidence.scene.may_be_town:
+    if evidence.mask.is_ground or not evidence.scene.may_be_town:
         return None
     if points.agreeing >= _CLEAR_SHARE * points.total:
         return None
