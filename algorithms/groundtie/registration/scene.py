@@ -14,10 +14,9 @@ from ..masks.scene import Scene
 from ..masks.town import PERHAPS_TOWN_SHARE, TOWN_SHARE, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.locked import Sensors
+from ..rasters.grid import PointFunction
 from ..rasters.pair import Image, ImagePair
-from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
-from ..rasters.reading import Window
 from ..sensor.orientation import SensorGrid
 from .specification import BOTH, NEITHER
 
@@ -249,12 +248,12 @@ _PAIR_FACTS = ("radar_name", "is_radar_and_camera", "are_both_radar")
 
 def scene_of(pair: ImagePair, name: str) -> Scene:
     """Return one image of a pair on the matching lattice, as far as searches may reach."""
-    grid = pair.surroundings
+    (image, to_px), grid = located(pair, name), pair.surroundings
+    return Scene(grid, lambda at: image.read_onto(grid.window(*at), to_px), image.source)
 
-    def read(window: Window) -> Patch:
-        piece = grid.window(*window)
-        if name == REFERENCE:
-            return pair.reference_patch(piece)
-        return pair.input_patch(piece, pair.nominal_px)
 
-    return Scene(grid, read, getattr(pair, name).source)
+def located(pair: ImagePair, name: str) -> tuple[Image, PointFunction]:
+    """Return one image of a pair, and what takes map positions to its pixels, nominally."""
+    if name == REFERENCE:
+        return pair.reference, pair.reference.source.grid.map_to_pixel
+    return pair.input, pair.nominal_px

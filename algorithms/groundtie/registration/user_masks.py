@@ -25,8 +25,8 @@ from ..progress import Progress
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import ImagePair
-from ..rasters.reading import FloatImage, RasterSource, Window, open_raster
-from .scene import scene_of
+from ..rasters.reading import RasterSource, open_raster
+from .scene import located, scene_of
 
 _CLASSIFIER_SUFFIX = ".json"
 _VECTOR_SUFFIXES = (".gpkg", ".geojson", ".shp", ".fgb", ".kml", ".gml")
@@ -192,19 +192,14 @@ def _scene_classifier(pair: ImagePair, name: str, scene: Scene, path: Path) -> C
         The file is no classifier, or one for an image of other bands.
     """
     classifier = read_classifier(path)
-    image, count = scene.like.path, len(scene.like.image_bands)
+    (image, to_px), count = located(pair, name), len(scene.like.image_bands)
     if classifier.bands not in (0, count):
         raise ParameterError(
-            f"{path} was trained on an image of {classifier.bands} bands; {image} has {count}"
+            f"{path} was trained on an image of {classifier.bands} bands; "
+            f"{image.source.path} has {count}"
         )
-
-    def bands(window: Window) -> FloatImage:
-        piece = scene.grid.window(*window)
-        if name == REFERENCE:
-            return pair.reference.bands_onto(piece, pair.reference.source.grid.map_to_pixel)
-        return pair.input.bands_onto(piece, pair.nominal_px)
-
-    return ClassifiedScene(scene, bands, classifier)
+    grid = scene.grid
+    return ClassifiedScene(scene, lambda at: image.bands_onto(grid.window(*at), to_px), classifier)
 
 
 def with_mask(
