@@ -9,12 +9,11 @@ from ...geometry.judging import (
     SMALLEST_SHARE_UNROTATED,
     TOLERANCE_PX,
 )
-from ..evidence import AGREEMENT, RegistrationEvidence
-from ..refinement_evidence import RefinementEvidence
+from ..evidence import AGREEMENT, EvidenceOfPoints, RegistrationEvidence
 from .rule import Rule
 
 
-def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _by_chance(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
     is_chance = points.log10_chance > LARGEST_LOG10_CHANCE
     if not is_chance and points.agreeing >= FEWEST_CHECK_POINTS:
@@ -22,14 +21,14 @@ def _by_chance(evidence: RegistrationEvidence | RefinementEvidence) -> str | Non
     return f"{points.agreeing} of {points.total} {points.name} agree, as they may by chance"
 
 
-def _few_agree(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _few_agree(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
     if points.agreeing >= points.least_share * points.total:
         return None
     return f"only {points.agreeing} of {points.total} {points.name} agree"
 
 
-def _exchanged_roles(evidence: RegistrationEvidence | RefinementEvidence) -> str | None:
+def _exchanged_roles(evidence: EvidenceOfPoints) -> str | None:
     if not isinstance(evidence, RegistrationEvidence) or evidence.exchanged is None:
         return None
     points = evidence.exchanged
