@@ -18,9 +18,7 @@ from .user_masks import UserMask
 
 # What tools may leave out that do not ask for it.
 USUAL: Mapping[str, Any] = {
-    "displacement": None,
     "output_grid": "reference",
-    "mask_values": None,
     "surface_model": None,
     "views": None,
 }
