@@ -26,8 +26,7 @@ from groundtie.registration.scene import scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
 from groundtie.registration.surface_masks import (
     ModelFit,
-    fit_of,
-    surface_ground,
+    fitted_ground,
     with_surface_mask,
 )
 from groundtie.simulation.files import write_pair
@@ -78,8 +77,7 @@ def pair_of(city: Path, stack: ExitStack, turned: bool = False) -> ImagePair:
 
 def fit_on(scene: Scene, stated: StatedSurface, stack: ExitStack) -> ModelFit:
     """Return how a model fits a reference where it lies."""
-    ground = surface_ground(scene, stated, stack)
-    fit = fit_of(ground, stated.views[0], scene.read)
+    _, fit = fitted_ground(scene, stated, stack)
     assert fit is not None
     return fit
 

@@ -28,7 +28,6 @@ from .scene import SceneInfo
 from .sensor_input import Ground, open_oriented_image
 from .sensor_jobs import RefinedRpc, refine
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
-from .verdict import Verdict
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
@@ -158,17 +157,13 @@ def _first_accepted(
             spec = replace(way.spec, **asked, tries=tries + 1)
             found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
             verdict, tries = found[-1].verdict, found[-1].spec.tries
-            tried.append(_line(way.name, way.because, verdict))
+            word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
+            tried.append(f"{way.name}, as {way.because}: {word}")
             if verdict.is_final:
                 break
         chosen = found[-1] if found[-1].verdict.is_final else found[0]
         chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
         return chosen, stack.pop_all()
-
-
-def _line(name: str, because: str, verdict: Verdict) -> str:
-    word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
-    return f"{name}, as {because}: {word}"
 
 
 def _needs_rpcs(raster: Any) -> bool:

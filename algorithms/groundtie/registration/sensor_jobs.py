@@ -222,10 +222,9 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
 
 
 def _matched(
-    parameters: Mapping[str, Any], stack: ExitStack, context: Context
+    given: Mapping[str, Any], stack: ExitStack, context: Context
 ) -> tuple[OrientedImage, GroundControl | None]:
     """Return the oriented image, and ground control matched in the reference if there is one."""
-    given = parameters
     cover = given["dem_cover"] / 100
     ground = Ground(given["dem"], given["dem_datum"], given["geoid"], given["height"], cover)
     reference = None

@@ -100,21 +100,16 @@ def fitted_ground(
     NoOverlapError
         The surface model covers nothing of the reference.
     """
-    ground = surface_ground(scene, stated, stack)
-    ground.require_cover()
-    fit = fit_of(ground, ground.views[0], ground.scene.read)
-    is_clear = fit is not None and fit.is_clear
-    return (replace(ground, offset_px=fit.offset_px) if fit and is_clear else ground), fit
-
-
-def surface_ground(scene: Scene, stated: StatedSurface, stack: ExitStack) -> SurfaceGround:
-    """Return the ground that all views show, by the model where it lies; see `fitted_ground`."""
     model: SurfaceModel
     if UserMask(stated.model).is_layer:
         model = read_footprints(stated.model, scene.grid)
     else:
         model = RasterModel(stack.enter_context(open_raster(stated.model)))
-    return SurfaceGround(scene, model, stated.views)
+    ground = SurfaceGround(scene, model, stated.views)
+    ground.require_cover()
+    fit = fit_of(ground, ground.views[0], ground.scene.read)
+    is_clear = fit is not None and fit.is_clear
+    return (replace(ground, offset_px=fit.offset_px) if fit and is_clear else ground), fit
 
 
 def rendered_surface(image: Image, view: View, stack: ExitStack, context: Context) -> Image:
