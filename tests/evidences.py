@@ -184,7 +184,7 @@ def refinement(
 ) -> RefinementEvidence:
     """Return the evidence of RPCs that are refined by ground control."""
     adjusted = adjust(fit, kind)
-    return RefinementEvidence.of(
+    return RefinementEvidence(
         fit, adjusted, check, pixel_m, max_error_px, folding_px, common=common
     )
 

@@ -10,7 +10,7 @@ from ..assessment.point_errors import PointErrors
 from ..errors import NotRegisteredError, TooFewPointsError
 from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..rasters.grid import PIXEL_COORDINATES, Grid
-from ..sensor.adjustment import Adjustment, Control, adjust
+from ..sensor.adjustment import adjust
 from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
@@ -31,24 +31,16 @@ class Refinement:
         The image, with the RPCs as delivered.
     points
         The ground control; blunders are rejected.
-    control, check
-        Points of the fit and points that took no part, as the delivered RPCs see them; None:
-        there are none of the latter.
-    adjustment
-        The bias.
     fit
         RPCs with the bias folded in.
     evidence
-        What the verdict rests on, with the errors before and after.
+        What the verdict rests on: the points as the delivered RPCs see them, and the bias.
     verdict
         Whether the refined RPCs can be trusted.
     """
 
     image: OrientedImage
     points: ControlPoints
-    control: Control
-    check: Control | None
-    adjustment: Adjustment
     fit: RPCFit
     evidence: RefinementEvidence
     verdict: Verdict
@@ -90,7 +82,6 @@ class Refinement:
         rpc = image.orientation.rpc
         seen = points.seen_by(rpc, image.size)
         control = seen.take(fitted)
-        check = seen.take(checked) if checked.any() else None
         try:
             adjustment = adjust(control, model)
         except TooFewPointsError as error:
@@ -99,13 +90,12 @@ class Refinement:
         blunders = np.zeros(len(table), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
         needs_spread = not (is_measured and model == SHIFT)
-        pixel_m = sensor_grid(image.source, image.orientation).pixel_size_m
         fit = fold(rpc, adjustment.bias)
-        evidence = RefinementEvidence.of(
+        evidence = RefinementEvidence(
             control,
             adjustment,
-            check,
-            pixel_m,
+            seen.take(checked) if checked.any() else None,
+            sensor_grid(image.source, image.orientation).pixel_size_m,
             max_error_px,
             fit.largest_residual_px,
             needs_spread,
@@ -113,7 +103,7 @@ class Refinement:
         )
         kept = replace(points, points=table.reject(blunders, "blunder"))
         verdict = judge(evidence)
-        return cls(image, kept, control, check, adjustment, fit, evidence, verdict)
+        return cls(image, kept, fit, evidence, verdict)
 
     @property
     def grid(self) -> Grid:
@@ -125,17 +115,17 @@ class Refinement:
 
         Without check points, those are shown for them that points have when they are left out.
         """
-        bias, held_out = self.adjustment.bias, self.check
-        fitted = self.control.residuals_px(bias)
+        control, adjustment = self.evidence.control, self.evidence.adjustment
+        fitted, held_out = control.residuals_px(adjustment.bias), self.evidence.check
         if held_out is None:
-            held_out, missed = self.control, self.adjustment.left_out_px
+            held_out, missed = control, adjustment.left_out_px
         else:
-            missed = held_out.residuals_px(bias)
+            missed = held_out.residuals_px(adjustment.bias)
         return PointErrors(
-            np.concatenate([self.control.found_px, held_out.found_px]),
+            np.concatenate([control.found_px, held_out.found_px]),
             np.concatenate([fitted, missed]),
             np.repeat([False, True], [len(fitted), len(missed)]),
-            np.append(self.adjustment.used, np.ones(len(missed), bool)),
+            np.append(adjustment.used, np.ones(len(missed), bool)),
         )
 
     def accepted(self) -> RPCFit:
@@ -156,7 +146,8 @@ class Refinement:
         With `own_heights` the points have heights of their own, which are compared.
         """
         above = self._median_above() if own_heights else None
-        return check_heights(self.image.orientation, self.control, self.adjustment, above)
+        control, adjustment = self.evidence.control, self.evidence.adjustment
+        return check_heights(self.image.orientation, control, adjustment, above)
 
     def _median_above(self) -> float | None:
         """Return how far points that have heights of their own lie above the ground."""

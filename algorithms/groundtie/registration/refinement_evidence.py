@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,49 +26,84 @@ class RefinementEvidence:
 
     Parameters
     ----------
-    held_out
-        How points that took no part agree with the refined RPCs.
-    before_px, after_px
-        Errors at those of them that are inliers, by the RPCs as delivered and as refined, shape
-        (n, 2).
-    extent
-        Share of the sides of the image that control spreads over, the smaller one.
-    extrapolated_share
-        Share of the image outside of the hull of the control.
-    fit_points, fit_points_used
-        How many points the fit had, and how many of them it used.
+    control
+        The points of the fit.
+    adjustment
+        The bias that was estimated from them.
+    check
+        Points that took no part; None: there are none. Of too few, each point of the fit is judged
+        by a fit without it and its neighbours.
     metres_per_px
         Side of an image pixel on the ground.
+    max_error_px
+        Largest root mean square error at held-out points.
     folding_px
         By how much RPCs with the bias folded in miss it.
     needs_spread
         Whether control at one place does not tell the bias elsewhere; who measured points and asks
         for a shift states that it does.
+    common
+        What displaces all points alike, in pixels of the image, as far as it is known.
     """
 
-    held_out: HeldOut
-    before_px: FloatArray
-    after_px: FloatArray
-    extent: float
-    extrapolated_share: float
-    fit_points: int
-    fit_points_used: int
+    control: Control
+    adjustment: Adjustment
+    check: Control | None
     metres_per_px: float
-    folding_px: float
+    max_error_px: float
+    folding_px: float = 0.0
     needs_spread: bool = True
+    common: Common = NOTHING_COMMON
 
     stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
     judged: ClassVar = "the refined RPCs"
 
     @property
+    def fit_points(self) -> int:
+        """How many points the fit had."""
+        return len(self.control)
+
+    @property
+    def fit_points_used(self) -> int:
+        """How many of them it used."""
+        return int(self.adjustment.used.sum())
+
+    @property
+    def extent(self) -> float:
+        """Share of the sides of the image that control spreads over, the smaller one."""
+        return float((np.ptp(self._used_px, axis=0) / np.array(self.control.size)).min())
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the image outside of the hull of the control."""
+        return 1 - hull_share(self._used_px, self.control.size)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How points that took no part agree with the refined RPCs."""
+        name, _, after = self._held
+        misses, bias = self._misses, self.adjustment.bias
+        nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
+        return HeldOut.of(
+            name,
+            misses,
+            len(after),
+            "the image",
+            np.maximum(self.adjustment.spread_px(nodes_px), bias.sigma_px(nodes_px)),
+            predict_accuracy(self.adjustment.fold_biases, nodes_px, misses, self.common),
+        )
+
+    @property
     def before(self) -> Statistics:
         """Errors at the held-out inliers by the RPCs as delivered, px."""
-        return Statistics.of(self.before_px)
+        _, points, _ = self._held
+        return Statistics.of(points.residuals_px(None)[self._misses.mixture.inliers])
 
     @property
     def after(self) -> Statistics:
         """Errors at the held-out inliers by the refined RPCs, px."""
-        return Statistics.of(self.after_px)
+        _, _, after = self._held
+        return Statistics.of(after[self._misses.mixture.inliers])
 
     def summary(self) -> dict[str, Any]:
         """Return which points were held out, and their errors, as values that JSON can carry."""
@@ -80,74 +116,20 @@ class RefinementEvidence:
         }
         return {"held_out": self.held_out.name, **errors}
 
-    @classmethod
-    def of(
-        cls,
-        control: Control,
-        adjustment: Adjustment,
-        check: Control | None,
-        pixel_m: float,
-        max_error_px: float,
-        folding_px: float = 0.0,
-        needs_spread: bool = True,
-        common: Common = NOTHING_COMMON,
-    ) -> RefinementEvidence:
-        """Measure a bias that was estimated.
+    @property
+    def _used_px(self) -> FloatArray:
+        return self.control.found_px[self.adjustment.used]
 
-        Parameters
-        ----------
-        control
-            The points of the fit.
-        adjustment
-            What was fitted to them.
-        check
-            Points that took no part; None: there are none, so that each point of the fit is
-            judged by a fit without it and its neighbours.
-        pixel_m
-            Side of an image pixel on the ground.
-        max_error_px
-            Largest root mean square error at held-out points.
-        folding_px
-            By how much RPCs with the bias folded in miss it.
-        needs_spread
-            Whether control at one place does not tell the bias elsewhere.
-        common
-            What displaces all points alike, in pixels of the image, as far as it is known.
-        """
-        if check is None or len(check) < FEWEST_CHECK_POINTS:
-            name, points = LEFT_OUT, control
-            after = adjustment.left_out_px
-        else:
-            name, points = CHECK_POINTS, check
-            after = check.residuals_px(adjustment.bias)
-        before = points.residuals_px(None)
+    @cached_property
+    def _held(self) -> tuple[str, Control, FloatArray]:
+        """What took no part, in words, as points, and by how much the bias misses it, (n, 2)."""
+        if self.check is None or len(self.check) < FEWEST_CHECK_POINTS:
+            return LEFT_OUT, self.control, self.adjustment.left_out_px
+        return CHECK_POINTS, self.check, self.check.residuals_px(self.adjustment.bias)
+
+    @cached_property
+    def _misses(self) -> Misses:
+        _, points, after = self._held
         reach = max(int(np.ceil(np.hypot(*after.T).max(initial=0.0))), LEAST_REACH_PX)
-        tolerance = max(TOLERANCE_PX, max_error_px)
-        misses = Misses(points.expected_px, after, reach, max_error_px, tolerance)
-        nodes_px = Grid(PIXEL_COORDINATES, None, *control.size).lattice()
-        held_out = HeldOut.of(
-            name,
-            misses,
-            len(after),
-            "the image",
-            _spread_px(adjustment, nodes_px),
-            predict_accuracy(adjustment.fold_biases, nodes_px, misses, common),
-        )
-        used_px = control.found_px[adjustment.used]
-        return cls(
-            held_out,
-            before[misses.mixture.inliers],
-            after[misses.mixture.inliers],
-            float((np.ptp(used_px, axis=0) / np.array(control.size)).min()),
-            1 - hull_share(used_px, control.size),
-            len(control),
-            int(adjustment.used.sum()),
-            pixel_m,
-            folding_px,
-            needs_spread,
-        )
-
-
-def _spread_px(adjustment: Adjustment, px: FloatArray) -> FloatArray:
-    """Return how far the correction varies with its points at places (n, 2), shape (n,)."""
-    return np.maximum(adjustment.spread_px(px), adjustment.bias.sigma_px(px))
+        tolerance = max(TOLERANCE_PX, self.max_error_px)
+        return Misses(points.expected_px, after, reach, self.max_error_px, tolerance)

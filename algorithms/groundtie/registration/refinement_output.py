@@ -128,11 +128,12 @@ def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progres
 def _compared(refinement: Refinement, found: GroundControl) -> Comparison:
     """Draw the reference and the image on the map, as delivered and as refined."""
     pair, image = found.registration.pair, refinement.image
+    bias = refinement.evidence.adjustment.bias
     delivered = replace(image.source, grid=sensor_grid(image.source, image.orientation))
     pair = replace(pair, input=replace(pair.input, source=delivered))
 
     def refined(xy: FloatArray) -> FloatArray:
         px = image.orientation.to_px(xy)
-        return px + refinement.adjustment.bias(px)
+        return px + bias(px)
 
     return Comparison.of(pair, refined)

@@ -210,7 +210,7 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         fit = files.write(refinement, heights, found, context.part(0.9, 1.0).progress)
     return RefinedRpc(
         fit,
-        refinement.adjustment,
+        refinement.evidence.adjustment,
         refinement.evidence,
         refinement.verdict,
         heights,

@@ -40,7 +40,7 @@ class RefinementReport(Page):
         found = self.refinement
         return {
             "verdict": found.verdict.summary() | found.evidence.summary(),
-            "bias": found.adjustment.bias.to_json(),
+            "bias": found.evidence.adjustment.bias.to_json(),
             "points_by_hand": found.points.by_hand,
             "heights": {"used": found.image.heights, "warnings": self.heights.warnings()},
             "mask": None if self.mask is None else self.mask.summary(),
@@ -53,7 +53,7 @@ class RefinementReport(Page):
             self.refinement.verdict,
             self.refinement.evidence,
         )
-        residuals, grid, bias = found.residuals(), found.grid, found.adjustment.bias
+        residuals, grid, bias = found.residuals(), found.grid, evidence.adjustment.bias
         measured = {"before": evidence.before, "after": evidence.after}
         return {
             "verdict": verdict,
