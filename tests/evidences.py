@@ -20,7 +20,7 @@ from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Surveys
 from groundtie.registration.evidence import Evidence, RegistrationEvidence
-from groundtie.registration.refinement_evidence import RefinementEvidence
+from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
 from groundtie.registration.verdict import refusals
 from groundtie.sensor.adjustment import Control, adjust

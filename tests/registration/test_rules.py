@@ -52,7 +52,7 @@ from groundtie.registration.evidence import (
     SearchEvidence,
 )
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
-from groundtie.registration.refinement_evidence import RefinementEvidence
+from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence

@@ -2,23 +2,146 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..assessment.point_errors import PointErrors
+from ..assessment.statistics import Statistics
 from ..errors import NotRegisteredError, TooFewPointsError
-from ..geometry.accuracy import NOTHING_COMMON, Common
-from ..rasters.grid import PIXEL_COORDINATES, Grid
-from ..sensor.adjustment import adjust
+from ..geometry.accuracy import NOTHING_COMMON, Common, predict_accuracy
+from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
+from ..geometry.misses import Misses
+from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
+from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control, adjust
 from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .refinement_evidence import RefinementEvidence
+from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge, judge_search
+
+CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
+
+
+@dataclass(frozen=True)
+class RefinementEvidence:
+    """What is known of refined RPCs.
+
+    Parameters
+    ----------
+    control
+        The points of the fit.
+    adjustment
+        The bias that was estimated from them.
+    check
+        Points that took no part; None: there are none. Of too few, each point of the fit is judged
+        by a fit without it and its neighbours.
+    metres_per_px
+        Side of an image pixel on the ground.
+    max_error_px
+        Largest root mean square error at held-out points.
+    folding_px
+        By how much RPCs with the bias folded in miss it.
+    needs_spread
+        Whether control at one place does not tell the bias elsewhere; who measured points and asks
+        for a shift states that it does.
+    common
+        What displaces all points alike, in pixels of the image, as far as it is known.
+    """
+
+    control: Control
+    adjustment: Adjustment
+    check: Control | None
+    metres_per_px: float
+    max_error_px: float
+    folding_px: float = 0.0
+    needs_spread: bool = True
+    common: Common = NOTHING_COMMON
+
+    stages: ClassVar = (AGREEMENT, ERROR, REFINEMENT)
+    judged: ClassVar = "the refined RPCs"
+
+    @property
+    def fit_points(self) -> int:
+        """How many points the fit had."""
+        return len(self.control)
+
+    @property
+    def fit_points_used(self) -> int:
+        """How many of them it used."""
+        return int(self.adjustment.used.sum())
+
+    @property
+    def extent(self) -> float:
+        """Share of the sides of the image that control spreads over, the smaller one."""
+        return float((np.ptp(self._used_px, axis=0) / np.array(self.control.size)).min())
+
+    @property
+    def extrapolated_share(self) -> float:
+        """Share of the image outside of the hull of the control."""
+        return 1 - hull_share(self._used_px, self.control.size)
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """How points that took no part agree with the refined RPCs."""
+        name, _, after = self._held
+        misses, bias = self._misses, self.adjustment.bias
+        nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
+        return HeldOut.of(
+            name,
+            misses,
+            len(after),
+            "the image",
+            np.maximum(self.adjustment.spread_px(nodes_px), bias.sigma_px(nodes_px)),
+            predict_accuracy(self.adjustment.fold_biases, nodes_px, misses, self.common),
+        )
+
+    @property
+    def before(self) -> Statistics:
+        """Errors at the held-out inliers by the RPCs as delivered, px."""
+        _, points, _ = self._held
+        return Statistics.of(points.residuals_px(None)[self._misses.mixture.inliers])
+
+    @property
+    def after(self) -> Statistics:
+        """Errors at the held-out inliers by the refined RPCs, px."""
+        _, _, after = self._held
+        return Statistics.of(after[self._misses.mixture.inliers])
+
+    def summary(self) -> dict[str, Any]:
+        """Return which points were held out, and their errors, as values that JSON can carry."""
+        errors = {
+            name: {
+                key: value if math.isfinite(value) else None
+                for key, value in statistics.summary("px", ("col", "row")).items()
+            }
+            for name, statistics in (("before", self.before), ("after", self.after))
+        }
+        return {"held_out": self.held_out.name, **errors}
+
+    @property
+    def _used_px(self) -> FloatArray:
+        return self.control.found_px[self.adjustment.used]
+
+    @cached_property
+    def _held(self) -> tuple[str, Control, FloatArray]:
+        """What took no part, in words, as points, and by how much the bias misses it, (n, 2)."""
+        if self.check is None or len(self.check) < FEWEST_CHECK_POINTS:
+            return LEFT_OUT, self.control, self.adjustment.left_out_px
+        return CHECK_POINTS, self.check, self.check.residuals_px(self.adjustment.bias)
+
+    @cached_property
+    def _misses(self) -> Misses:
+        _, points, after = self._held
+        reach = max(int(np.ceil(np.hypot(*after.T).max(initial=0.0))), LEAST_REACH_PX)
+        tolerance = max(TOLERANCE_PX, self.max_error_px)
+        return Misses(points.expected_px, after, reach, self.max_error_px, tolerance)
 
 
 @dataclass(frozen=True)

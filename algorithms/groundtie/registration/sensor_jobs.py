@@ -22,8 +22,7 @@ from ..sensor.height_check import HeightCheck
 from ..sensor.rpc_fit import RPCFit
 from .asked import asked_masks, searched
 from .ground_control import GroundControl, match_ground_control, require_crs
-from .refinement import Refinement
-from .refinement_evidence import RefinementEvidence
+from .refinement import Refinement, RefinementEvidence
 from .refinement_output import RefinementFiles
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification

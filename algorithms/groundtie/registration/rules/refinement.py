@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ..evidence import REFINEMENT
-from ..refinement_evidence import RefinementEvidence
 from .rule import Rule
+
+if TYPE_CHECKING:
+    from ..refinement import RefinementEvidence
 
 # Control must spread over so much of each side of an image (suite rpc).
 _SMALLEST_EXTENT = 0.25
