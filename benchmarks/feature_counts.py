@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -179,7 +179,7 @@ def count_turn(case: RealCase, gradient: str) -> TurnCount:
         if turns:
             col, row = second.position_px.T
             back = np.column_stack([input.values.shape[1] - 1 - row, col])
-            second = second.moved(back - second.position_px)
+            second = replace(second, position_px=back)
         right = _right(points.take(matches.first), second, max(case.sigma_px, _RIGHT_PX))
         found.append(int(right.sum()))
     return TurnCount(case.name, gradient, *found)

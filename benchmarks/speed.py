@@ -155,7 +155,7 @@ def _own_surface_seconds(template: NDArray[np.float32], search: NDArray[np.float
     with threads(THREADS) as context:
         started = time.perf_counter()
         windows = [describe(patch, WINDOW_PX**2, settings) for patch in patches]
-        nmi(*windows, RADIUS_PX, context)
+        nmi(*windows, context)
         return time.perf_counter() - started
 
 
