@@ -19,6 +19,7 @@ from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import tiles, warp_raster, write_with_geotransform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.reading import open_raster
+from groundtie.rasters.writing import keep_apart
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(90, 70)
@@ -154,6 +155,23 @@ def test_nodata_is_kept_and_no_pixel_becomes_it(small_tiles: None, tmp_path: Pat
     # At 0.4 px from a pixel that is still the nearest one.
     np.testing.assert_array_equal(values > 0, image > 0)
     assert values[values > 0].min() == 1
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64", "complex64"])
+@pytest.mark.parametrize("nodata", [0.0, 7.0, -9999.0])
+def test_gdal_reads_no_valid_number_as_nodata(tmp_path: Path, nodata: float, dtype: str) -> None:
+    """It compares with a tolerance, of complex numbers the real parts."""
+    near = nodata * (1 + np.array([0, 1e-8, -1e-7, 3e-7, -4e-7, 1e-6]))
+    image = (near[None] + (2j if dtype == "complex64" else 0)).astype(dtype)
+    path = write_raster(tmp_path / "a.tif", image, utm_grid(6, 1), nodata=nodata)
+    with rasterio.open(path) as dataset:
+        assert not dataset.read_masks(1)[0, :4].any()
+    kept = image.copy()
+    keep_apart(kept, image.dtype.type(nodata))
+    np.testing.assert_allclose(kept, image, rtol=1e-6, atol=1e-37)
+    path = write_raster(tmp_path / "b.tif", kept, utm_grid(6, 1), nodata=nodata)
+    with rasterio.open(path) as dataset:
+        assert dataset.read_masks(1).all()
 
 
 def test_without_nodata_integers_get_a_mask_where_pixels_are_missing(

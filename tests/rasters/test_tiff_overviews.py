@@ -79,12 +79,13 @@ def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_complex_pixels_are_0_where_nothing_is_valid(tmp_path: Path) -> None:
+@pytest.mark.parametrize("dtype", ["complex64", "complex_int16"])
+def test_complex_pixels_are_0_where_nothing_is_valid(tmp_path: Path, dtype: str) -> None:
     image = (RNG.normal(size=(1, *ODD)) + 1j * RNG.normal(size=(1, *ODD))).astype(np.complex64)
     mask = np.ones(ODD, bool)
     mask[200:900, 300:1000] = False
     for _ in range(5):  # memory that is taken anew holds what was there before
-        found, shown = _overview(tmp_path, image, mask, nodata=None)
+        found, shown = _overview(tmp_path, 99 * image, mask, nodata=None, dtype=dtype)
         assert 0 < np.count_nonzero(~shown) < shown.size
         np.testing.assert_array_equal(found[0][~shown[0]], 0)
 
@@ -95,10 +96,12 @@ def _overview(
     mask: NDArray[np.bool_],
     nodata: float | None,
     colours: tuple[ColorInterp, ...] | None = None,
+    **more: Any,
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Return the first overview of a file with an image, and what is valid in it."""
     grid = utm_grid(*image.shape[:0:-1])
-    source_file = write_raster(folder / "a.tif", image, grid, nodata=nodata, colorinterp=colours)
+    more |= {"nodata": nodata, "colorinterp": colours}
+    source_file = write_raster(folder / "a.tif", image, grid, **more)
     masked = nodata is None and not mask.all()
     with open_raster(source_file) as source, Outputs() as outputs:
         staged = outputs.stage(folder / "b.tif")

@@ -94,13 +94,14 @@ class Reduced:
         )
         shape = (window.height, window.width)
         how = Resampling.nearest if self.nearest else Resampling.average
-        # Where nothing is valid GDAL leaves complex pixels as they are in memory.
         values = np.zeros((len(bands), *shape), numpy_dtype(dataset.dtypes[0]))
         dataset.read(bands, out=values, window=place, resampling=how)
-        if self.level.mask is None or bands[0] != 1:
+        if self.level.mask is None:
             return values, None
-        mask = dataset.read_masks(1, window=place, out_shape=shape, resampling=how)
-        return values, mask > 0
+        valid = dataset.read_masks(1, window=place, out_shape=shape, resampling=how) > 0
+        # Where nothing is valid GDAL leaves complex pixels as they are in memory.
+        values[:, ~valid] = 0
+        return values, valid if bands[0] == 1 else None
 
     def _means(
         self, dataset: Any, bands: list[int], window: Window

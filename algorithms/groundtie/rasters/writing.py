@@ -33,6 +33,11 @@ from .tiling import in_order
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
 _OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
 
+# GDAL takes floating-point numbers, of double precision, too, for the nodata value if they differ
+# from it by less than this share of it: `ARE_REAL_EQUAL` of its
+# gcore/gdal_priv.h.
+_SAME_AS_NODATA = 4 * float(np.finfo(np.float32).eps)
+
 # Endings by which users ask for a Cloud Optimized GeoTIFF.
 COG_SUFFIXES = (".cog.tif", ".cog.tiff")
 
@@ -230,11 +235,15 @@ def fill_value(source: RasterSource, nodata: float | None, band: int) -> Any:
 
 
 def keep_apart(values: np.ndarray[Any, Any], fill: Any) -> None:
-    """Change valid values that happen to equal the nodata value, in place, by the least step."""
-    if values.dtype.kind == "f":
-        neighbour = np.nextafter(fill, values.dtype.type(np.inf))
-    elif values.dtype.kind == "c":
-        neighbour = fill + np.finfo(values.dtype).tiny
-    else:
-        neighbour = fill + 1 if fill < np.iinfo(values.dtype).max else fill - 1
-    values[values == fill] = neighbour
+    """Change valid values that GDAL reads as the nodata value, in place, by the least step.
+
+    It compares real parts.
+    """
+    part, nodata = values.real, fill.real
+    if part.dtype.kind != "f":
+        neighbour = nodata + 1 if nodata < np.iinfo(part.dtype).max else nodata - 1
+        part[part == nodata] = neighbour
+    elif np.isfinite(nodata):
+        near = np.abs(part - nodata) <= _SAME_AS_NODATA * abs(nodata)
+        apart = nodata * part.dtype.type(1 - 1.25 * _SAME_AS_NODATA)
+        part[near] = apart if nodata else np.nextafter(nodata, part.dtype.type(1))
