@@ -64,8 +64,24 @@ class TestVerdict:
         assert verdict.reason == f"{name.replace('_', '-')} inconsistency is 3.50 px, above 3 px"
 
     def test_two_points_are_too_few(self) -> None:
+        assert Assessment(check_points=self.errors([0.1, 0], 3)).judge(3.0).accepted
         verdict = Assessment(check_points=self.errors([0.1, 0], 2)).judge(3.0)
+        assert verdict.rule == "chance agreement"
         assert verdict.reason == "2 check points are too few to measure anything"
+
+    @pytest.mark.parametrize(
+        ("inliers", "of", "rule"),
+        [
+            (2, 5, "chance agreement"),
+            (4, 20, "small share of check points"),
+            (5, 20, ""),
+        ],
+    )
+    def test_few_inliers_refuse(self, inliers: int, of: int, rule: str) -> None:
+        errors = self.errors([0.1, 0], of)
+        counted = np.arange(of) < inliers
+        verdict = Assessment(test_points=replace(errors, counted=counted)).judge(3.0)
+        assert verdict.rule == rule
 
     def test_a_point_that_cannot_be_placed_is_no_small_error(self) -> None:
         errors = self.errors([0.1, 0])

@@ -109,7 +109,6 @@ def assessed(
 
 
 NOWHERE = np.array([[np.nan, 0.0]])
-FEW = np.zeros((3, 2))
 
 
 def stored(px: np.ndarray, errors: np.ndarray, kind: str = "affine") -> TiePointEvidence:
@@ -149,8 +148,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         SearchEvidence(BandError("there is no band 7")),
     ),
     "points not placed": (assessed(np.concatenate([GOOD, NOWHERE])), assessed(GOOD)),
-    "few held-out points": (assessed(FEW[:2]), assessed(FEW)),
-    "few held-out inliers": (assessed(GOOD, 8), assessed(GOOD, 30)),
     "inconsistent ways": (assessed(GOOD, way=3.1), assessed(GOOD, way=2.9)),
     "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
     "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),

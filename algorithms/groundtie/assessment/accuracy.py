@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from ..errors import TooFewPointsError
-from ..registration.evidence import ASSESSMENT, ERROR, HeldOut
+from ..registration.evidence import AGREEMENT, ASSESSMENT, ERROR, HeldOut
 from ..registration.verdict import Verdict, decide
 from .point_errors import PointErrors
 
@@ -39,7 +39,7 @@ class AssessmentEvidence:
     max_error_px: float
     misses_px: Mapping[str, float]
 
-    stages: ClassVar = (ASSESSMENT, ERROR)
+    stages: ClassVar = (ASSESSMENT, AGREEMENT, ERROR)
 
     @property
     def held_out(self) -> HeldOut:

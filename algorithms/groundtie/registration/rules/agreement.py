@@ -1,4 +1,4 @@
-"""Rules on how many held-out points agree with a registration or with refined RPCs."""
+"""Rules on how many held-out points agree: with a registration, new or old, or refined RPCs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from .rule import Rule
 
 def _by_chance(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
+    if points.total < FEWEST_CHECK_POINTS:
+        return f"{points.total} {points.name} are too few to measure anything"
     is_chance = points.log10_chance > LARGEST_LOG10_CHANCE
     if not is_chance and points.agreeing >= FEWEST_CHECK_POINTS:
         return None
@@ -49,7 +51,7 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
         f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f}",
         "[Moisan2004]; suites crossings, city and attacks",
-        "give a larger part of the scene: more check points then confirm it",
+        "give a larger part of the scene, or more points that take no part in the fit",
         _by_chance,
     ),
     Rule(
@@ -58,7 +60,7 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree, or of a pose that "
         f"neither rotates nor scales less than {SMALLEST_SHARE_UNROTATED:.0%}",
         "suites simulated, real and attacks",
-        "mask clouds and changes; give bands that show the same",
+        "mask clouds and changes; give bands, or points, that show the same",
         _few_agree,
     ),
     Rule(
