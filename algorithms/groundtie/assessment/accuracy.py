@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from ..errors import TooFewPointsError
-from ..registration.evidence import AGREEMENT, ASSESSMENT, ERROR, HeldOut
+from ..registration.evidence import AGREEMENT, ASSESSMENT, ERROR, Agreement
 from ..registration.verdict import Verdict, decide
 from .point_errors import PointErrors
 
@@ -42,11 +42,11 @@ class AssessmentEvidence:
     stages: ClassVar = (ASSESSMENT, AGREEMENT, ERROR)
 
     @property
-    def held_out(self) -> HeldOut:
+    def held_out(self) -> Agreement:
         """How the points agree; nothing is known of chance and of the model's spread."""
         used, count = int(self.points.used.sum()), len(self.points)
         rmse = self.points.in_pixels.rmse
-        return HeldOut(self.name, used, count, math.nan, rmse, self.max_error_px, 0.0, "")
+        return Agreement(self.name, used, count, math.nan, rmse, self.max_error_px, 0.0, "")
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class SearchEvidence:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class Agreement:
     """How points that took no part in a fit agree with it.
 
     Parameters
@@ -125,7 +125,7 @@ class HeldOut:
         accuracy: Accuracy,
         tries: int = 1,
         least_share: float = SMALLEST_INLIER_SHARE,
-    ) -> HeldOut:
+    ) -> Agreement:
         """Return how points agree by what a model misses those by that have a peak.
 
         Parameters
@@ -179,7 +179,7 @@ class EvidenceOfPoints(Evidence, Protocol):
     @property
     def judged(self) -> str: ...
     @property
-    def held_out(self) -> HeldOut: ...
+    def held_out(self) -> Agreement: ...
     @property
     def fit_points(self) -> int: ...
     @property
@@ -283,11 +283,11 @@ class RegistrationEvidence:
         return self.counted.residual_on(self.grid, self.estimate.transform)
 
     @cached_property
-    def held_out(self) -> HeldOut:
+    def held_out(self) -> Agreement:
         """How the check points agree; those without a peak count as disagreeing."""
         misses, lattice = self._misses, self.grid.lattice()
         fold_models = self.estimate.fold_models
-        return HeldOut.of(
+        return Agreement.of(
             "check points",
             misses,
             len(self.check),

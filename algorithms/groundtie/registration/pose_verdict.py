@@ -27,7 +27,7 @@ from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, PoseWindows
 from ..pose.search import find_poses, moved_px
 from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
-from .evidence import AGREEMENT, ERROR, POSE, SURVEY, HeldOut, hull_share
+from .evidence import AGREEMENT, ERROR, POSE, SURVEY, Agreement, hull_share
 from .layover import CHIPS_MEAN_OVER_SCATTER, mean_of_heights_px
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
@@ -150,12 +150,12 @@ class PoseSurveyEvidence:
         return self.found.surveys
 
     @cached_property
-    def held_out(self) -> HeldOut:
+    def held_out(self) -> Agreement:
         """How each chip agrees with the pose as the others have it."""
         misses, total = self._misses, len(self.found.agrees)
         fold_models, lattice = self.found.fold_models, self.found.grid.lattice()
         heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
-        return HeldOut.of(
+        return Agreement.of(
             "chips all over",
             misses,
             total,

@@ -22,7 +22,7 @@ from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .evidence import AGREEMENT, ERROR, REFINEMENT, HeldOut, hull_share
+from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, hull_share
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge, judge_search
 
@@ -88,12 +88,12 @@ class RefinementEvidence:
         return 1 - hull_share(self._used_px, self.control.size)
 
     @cached_property
-    def held_out(self) -> HeldOut:
+    def held_out(self) -> Agreement:
         """How points that took no part agree with the refined RPCs."""
         name, _, after = self._held
         misses, bias = self._misses, self.adjustment.bias
         nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
-        return HeldOut.of(
+        return Agreement.of(
             name,
             misses,
             len(after),
