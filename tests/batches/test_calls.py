@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rasterio
+from raster_files import write_raster
+from rpc_models import camera_rpc
 from toys import TOY
 
 from groundtie.batches.calls import Call, make_calls
 from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.sensor.rpc_files import write_rpc
 from groundtie.tools import load_tool
 
 ROW = {"reference": "a.tif", "input": "b.tif", "size": "3"}
@@ -115,6 +121,101 @@ def test_the_key_stands_for_files_parameters_and_outputs(folders: tuple[Path, Pa
     assert len({first, key(seed=8), key(output="d.tif"), key(report="r.html")}) == 4
     os.utime(folders[0] / "b.tif", (1e9, 1e9))
     assert key() != first
+
+
+def key_of_series(folders: tuple[Path, Path], inputs: Any) -> str:
+    (call,) = make_calls(load_tool("coregister_series"), [{"inputs": inputs}], *folders, 1)
+    assert call.problem == ""
+    return call.key
+
+
+@pytest.mark.parametrize("inputs", ["dates", "dates/*.tif", "dates.csv", "item.json"])
+def test_the_key_stands_for_the_files_that_an_input_stands_for(
+    folders: tuple[Path, Path], inputs: str
+) -> None:
+    (folders[0] / "dates").mkdir()
+    date = folders[0] / "dates/1.tif"
+    date.write_bytes(b"raster")
+    (folders[0] / "dates.csv").write_text("file,name\ndates/1.tif,first\n")
+    item = {"type": "Feature", "id": "1", "assets": {"data": {"href": "dates/1.tif"}}}
+    (folders[0] / "item.json").write_text(json.dumps(item))
+    first = key_of_series(folders, inputs)
+    assert key_of_series(folders, inputs) == first
+    with date.open("r+b") as file:  # in place: neither the folder nor its time changes
+        file.write(b"ano")
+    os.utime(date, (1e9, 1e9))
+    assert key_of_series(folders, inputs) != first
+
+
+@pytest.mark.parametrize("inputs", ["dates", "dates/*.tif"])
+def test_the_key_stands_for_the_files_of_folders_and_patterns(
+    folders: tuple[Path, Path], inputs: str
+) -> None:
+    (folders[0] / "dates").mkdir()
+    for number in (1, 2):
+        (folders[0] / f"dates/{number}.tif").write_bytes(b"raster")
+    first = key_of_series(folders, inputs)
+    (folders[0] / "dates/3.tif").touch()
+    assert key_of_series(folders, inputs) != first
+
+
+def test_files_of_one_name_in_two_folders_are_not_one(folders: tuple[Path, Path]) -> None:
+    for name in "xy":
+        (folders[0] / name).mkdir()
+        (folders[0] / name / "b.tif").write_bytes(b"raster")
+        os.utime(folders[0] / name / "b.tif", (1e9, 1e9))
+    row = {"reference": "x/b.tif", "input": "y/b.tif", "size": "3", "output": "c.tif"}
+    swapped = {**row, "reference": "y/b.tif", "input": "x/b.tif"}
+    keys = [calls_of(folders, one)[0].key for one in (row, swapped)]
+    assert keys[0] != keys[1]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["b.tif.aux.xml", "b.tif.ovr", "b.tif.msk", "b.tfw", "b.TFW", "b.tifw", "b.wld", "b.RPB",
+     "b_RPC.TXT", "b_rpc.txt", "b.tab"],
+)  # fmt: skip
+def test_the_key_stands_for_what_gdal_reads_beside_an_input(
+    folders: tuple[Path, Path], name: str
+) -> None:
+    write_raster(folders[0] / "b.tif", np.ones((9, 9), np.uint8))
+    (before,) = calls_of(folders, ROW)
+    write_beside(folders[0] / name)
+    with rasterio.open(folders[0] / "b.tif") as dataset:
+        assert [Path(file).name for file in dataset.files] == ["b.tif", name]
+    (after,) = calls_of(folders, ROW)
+    assert after.key != before.key
+
+
+def write_beside(path: Path) -> None:
+    """Write what GDAL takes for a part of `b.tif`."""
+    if path.suffix.lower() in (".ovr", ".msk"):
+        write_raster(path, np.ones((9, 9), np.uint8))
+    elif path.suffix.lower() in (".rpb", ".txt"):
+        write_rpc(path, camera_rpc())
+    elif path.suffix == ".xml":
+        path.write_text("<PAMDataset><Metadata><MDI key='a'>1</MDI></Metadata></PAMDataset>")
+    elif path.suffix == ".tab":
+        corners = [(0, 0), (9, 0), (0, 9)]
+        lines = [f'({10 + x},{20 - y}) ({x},{y}) Label "p",' for x, y in corners]
+        head = '!table\n!version 300\n\nDefinition Table\n  File "b.tif"\n  Type "RASTER"\n'
+        lines[-1] = lines[-1].rstrip(",")
+        path.write_text(head + "\n".join([*lines, "CoordSys Earth Projection 1, 104"]) + "\n")
+    else:
+        path.write_text("1\n0\n0\n-1\n10\n20\n")
+
+
+def test_what_a_row_writes_beside_its_input_is_none_of_its_inputs(
+    folders: tuple[Path, Path],
+) -> None:
+    (folders[0] / "gcps.csv").touch()
+    refined = folders[0] / "b_RPC.TXT"
+    row = {"image": "b.tif", "gcps": "gcps.csv", "output": str(refined)}
+    (before,) = make_calls(load_tool("refine_rpc"), [row], *folders, 1)
+    refined.touch()
+    (after,) = make_calls(load_tool("refine_rpc"), [row], *folders, 1)
+    assert before.problem == after.problem == ""
+    assert after.key == before.key
 
 
 def test_what_lies_beside_an_output_is_no_other_rows(folders: tuple[Path, Path]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
 from ..raster_names import raster_name
 from ..rasters.atomic import make_folder
 from ..runs import digest
+from .input_files import facts_read
 
 # The column that is no parameter.
 NAME = "name"
@@ -40,8 +41,8 @@ class Call:
     outputs
         Paths of the outputs that are asked for, by the parameters' names.
     key
-        Stands for tool, version, parameters, outputs, and the input files with their sizes and
-        times: calls with the same key have the same results (see `runs`).
+        Stands for tool, version, parameters, outputs, and the files that are read with their
+        places, sizes and times: calls with the same key have the same results.
     problem
         Why the row cannot be run at all; empty if it can.
     """
@@ -109,8 +110,9 @@ def _call(
     written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
     written = {key: path for key, path in written.items() if path is not None}
     places = sorted((key, str(path)) for key, path in written.items())
-    key = digest(tool.run_of_call(checked), places)
-    return Call(number, name, checked, written, key)
+    call = Call(number, name, checked, written)
+    read = facts_read(tool, checked, tuple(_files(tool, call)))
+    return replace(call, key=digest(tool.run_of_call(checked), places, read))
 
 
 def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: Path) -> Any:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -95,14 +96,13 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
 def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
     if isinstance(given, str):
         return _of_stac(given, asset) if is_item(given) else [_file(given)]
+    files = _standing_for(given)
     if given.is_dir():
-        files = sorted(path for path in given.iterdir() if path.suffix.lower() in RASTER_SUFFIXES)
         if not files:
             endings = ", ".join(RASTER_SUFFIXES)
             raise ParameterError(f"the folder {given} holds no raster ({endings})")
         return map(_file, files)
-    if any(sign in given.name for sign in "*?[") and not given.exists():
-        files = sorted(given.parent.glob(given.name))
+    if _is_pattern(given):
         if files:
             return [date for file in files for date in _listed(file, asset)]
         raise ParameterError(f"no file matches {given}")
@@ -113,6 +113,43 @@ def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
     if given.suffix.lower() in _TABLE:
         return [_of_row(given, number, row) for number, row in enumerate(read_rows(given), start=1)]
     return [_file(given)]
+
+
+def files_behind(given: Path) -> Iterator[Path]:
+    """Yield the files on disk by which a name becomes dates: itself, and those that it stands for.
+
+    What cannot be read stands for nothing: `list_dates` says why.
+    """
+    files = _standing_for(given)
+    if files != [given]:
+        for file in files:
+            yield from files_behind(file)
+        return
+    yield given
+    with suppress(OSError, ParameterError):
+        yield from (path for path in _named_in(given) if isinstance(path, Path))
+
+
+def _named_in(given: Path) -> Iterator[Path | str]:
+    """Yield what a STAC item or a table of dates names."""
+    if is_item(given):
+        for item in read_items(given)[0]:
+            yield item.place
+            yield from (located(str(asset["href"]), item.place) for asset in item.assets.values())
+    elif given.suffix.lower() in _TABLE:
+        for row in read_rows(given):
+            yield from (located(row[name], given) for name in ("file", "mask") if name in row)
+
+
+def _standing_for(given: Path) -> list[Path]:
+    """Return the files that a folder or a pattern stands for; of any other name itself."""
+    if given.is_dir():
+        return sorted(path for path in given.iterdir() if path.suffix.lower() in RASTER_SUFFIXES)
+    return sorted(given.parent.glob(given.name)) if _is_pattern(given) else [given]
+
+
+def _is_pattern(given: Path) -> bool:
+    return any(sign in given.name for sign in "*?[") and not given.exists()
 
 
 def _file(raster: Path | str) -> Listed:

@@ -1,0 +1,74 @@
+"""The files that a call reads: what its inputs name or stand for, and what lies beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from ..call_paths import inputs_of
+from ..declaration import Tool
+from ..kinds import Kind, RastersIn
+from ..masks.beside import mask_beside
+from ..rasters.atomic import SIDECARS
+from ..series.inputs import files_behind
+
+# What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
+# is not asked: it would open each file here, where one that kills it ends more than its row.
+_BEHIND = (*SIDECARS, ".hdr")
+_IN_PLACE = (".wld", ".tab", ".rpb", "_rpc.txt", ".imd", ".hdr", ".prj", ".dbf", ".shx", ".cpg")
+
+
+def files_read(kind: Kind, value: Any) -> Iterator[Path]:
+    """Yield the files, or folders of one raster, that a parameter's checked value stands for."""
+    for given in inputs_of(kind, value):
+        if isinstance(given, Path):
+            yield from files_behind(given) if isinstance(kind, RastersIn) else (given,)
+
+
+def facts_read(
+    tool: Tool, values: Mapping[str, Any], written: Collection[Path]
+) -> list[tuple[Any, ...]]:
+    """Return place, size and time of all files that a call reads, as a key can hold them.
+
+    Parameters
+    ----------
+    tool, values
+        The call.
+    written
+        What it writes: this may lie beside what it reads, and is none of it.
+    """
+    own = {os.path.abspath(path) for path in written}
+    facts: list[tuple[Any, ...]] = []
+    for parameter in tool.parameters:
+        for path in files_read(parameter.kind, values[parameter.name]):
+            inside = sorted(path.rglob("*")) if path.is_dir() else ()
+            found = map(_facts, chain([path], inside, _beside(path)))
+            facts += [(parameter.name, *one) for one in found if one[0] not in own]
+    return facts
+
+
+def _facts(path: Path) -> tuple[Any, ...]:
+    """Return the absolute path, and size in bytes and time in nanoseconds of a file."""
+    place = os.path.abspath(path)
+    try:
+        status = path.stat()
+    except OSError:
+        return (place,)
+    # A folder's own are no facts of the files in it.
+    return (place,) if path.is_dir() else (place, status.st_size, status.st_mtime_ns)
+
+
+def _beside(path: Path) -> Iterator[Path]:
+    """Yield what there is beside a file that belongs to it by its name."""
+    ending = path.suffix.lower()[1:]
+    # World files: of .tif as .tfw and .tifw.
+    world = (f".{ending[0]}{ending[-1]}w", f".{ending}w") if ending else ()
+    endings = [(path.name, more) for more in _BEHIND]
+    endings += [(path.stem, more) for more in (*world, *_IN_PLACE)]
+    names = [stem + spelled for stem, more in endings for spelled in (more, more.upper())]
+    yield from (other for name in names if (other := path.with_name(name)).exists())
+    if (mask := mask_beside(path)) is not None:
+        yield mask[0]
