@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import pickle
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -20,6 +21,7 @@ from groundtie.batches.work import DONE, FAILED, REFUSED, Outcome, Task
 from groundtie.declaration import Tool
 from groundtie.errors import CancelledError, ParameterError
 from groundtie.progress import SILENT, Progress
+from groundtie.strict_json import parse_json
 
 
 class Inline(Executor):
@@ -99,6 +101,22 @@ def test_the_summary_is_a_table_and_json(table: Path) -> None:
     assert details == json.loads(json.dumps(result.summary()))
     assert (details["done"], details["refused"], details["failed"]) == (1, 1, 0)
     assert details["rows"][1]["result"] == {"verdict": {"accepted": False, "reason": "too few"}}
+
+
+def test_a_number_that_is_not_finite_costs_no_other_row(
+    table: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = {"verdict": {"check_rmse_px": math.nan, "reason": "good", "errors": [1.5, math.inf]}}
+    monkeypatch.setattr("toys.ToyResult.summary", lambda _: found)
+    result = run(table, {}, {"mode": "refuse"})
+    assert statuses(result) == [DONE, REFUSED]
+    details = parse_json(result.details.read_bytes())  # strict JSON
+    held = {"check_rmse_px": None, "reason": "good", "errors": [1.5, None]}
+    assert details["rows"][0]["result"] == {"verdict": held}
+    for line in result.log.read_bytes().splitlines():
+        parse_json(line)
+    with result.table.open(newline="") as file:
+        assert [row["check_rmse_px"] for row in csv.DictReader(file)] == ["", ""]
 
 
 def test_lines_tell_what_did_not_end_well(table: Path) -> None:

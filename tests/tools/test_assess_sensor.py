@@ -9,7 +9,7 @@ import pytest
 from rpc_models import camera_rpc, write_dem, write_positions
 
 import groundtie
-from groundtie.errors import GroundTieError, TooFewPointsError
+from groundtie.errors import GeoreferencingError, GroundTieError, TooFewPointsError
 from groundtie.sensor.rpc_files import write_rpc
 
 TRUTH = camera_rpc()
@@ -87,6 +87,24 @@ def test_without_points_nothing_is_judged(files: dict[str, Path], tmp_path: Path
         "reference_x,reference_y,input_col,input_row,state\n9.0,45.15,1,2,rejected: blunder\n"
     )
     with pytest.raises(TooFewPointsError, match="no points that are used"):
+        groundtie.assess_sensor(**files, height=300.0, table=tmp_path / "a.csv")
+    assert not (tmp_path / "a.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [
+        "4.12e9,5e6,100,100,300.0,EPSG:32632,check",  # UTM has no ground there
+        "500000,5e6,1e9,100,300.0,EPSG:32632,check",  # the RPCs lead nowhere from there
+    ],
+)
+def test_points_that_the_rpcs_cannot_place_are_counted(
+    files: dict[str, Path], tmp_path: Path, lost: str
+) -> None:
+    head = files["check_points"].read_text().splitlines()[0]
+    good = "500000,5e6,100,100,300.0,EPSG:32632,check"
+    files["check_points"].write_text("\n".join([head, good, good, lost]))
+    with pytest.raises(GeoreferencingError, match="cannot place 1 of 3 points"):
         groundtie.assess_sensor(**files, height=300.0, table=tmp_path / "a.csv")
     assert not (tmp_path / "a.csv").exists()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import GeoreferencingError
 from ..rasters.atomic import write_csv, writing
 from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
@@ -34,12 +35,26 @@ class SensorErrors:
 
     @classmethod
     def of(cls, rpc: RPC, points: ControlPoints) -> SensorErrors:
-        """Measure the errors of RPCs."""
+        """Measure the errors of RPCs.
+
+        Raises
+        ------
+        GeoreferencingError
+            Points lie where the map has no ground, or have no ground or no image by the RPCs.
+        """
         table = points.points
         seen = rpc.localise(table.input_px, points.height_m)
         moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
-        per_unit = metres_per_unit_at(table.reference_xy.mean(axis=0), points.crs)
         error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
+        placed = np.isfinite(np.hstack([moved, error_px])).all(axis=1)
+        if not placed.all():
+            raise GeoreferencingError(
+                f"the RPCs cannot place {np.sum(~placed)} of {len(points)} points, the first at "
+                f"{table.reference_xy[~placed][0].tolist()} on the map and "
+                f"{table.input_px[~placed][0].tolist()} in the image: check these positions and "
+                "the points' CRS"
+            )
+        per_unit = metres_per_unit_at(table.reference_xy.mean(axis=0), points.crs)
         return cls(error_px, moved * per_unit)
 
     def summary(self) -> dict[str, Any]:

@@ -33,7 +33,8 @@ class EventLog:
             The disk is full, or the file cannot be written to.
         """
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
-        line = json.dumps({"time": now.replace("+00:00", "Z"), "event": event, **facts})
+        held = {"time": now.replace("+00:00", "Z"), "event": event, **facts}
+        line = json.dumps(held, allow_nan=False)
         with writing(self._path):
             self._file.write(line + "\n")
             self._file.flush()

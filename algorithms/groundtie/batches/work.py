@@ -15,6 +15,7 @@ from ..declaration import Tool
 from ..errors import CancelledError, GroundTieError, NotRegisteredError
 from ..executors import enter_worker, stop_requested
 from ..progress import Progress
+from ..report.page import plain
 from ..runs import running
 from ..version import __version__
 
@@ -37,7 +38,7 @@ class Outcome:
     seconds
         How long it took.
     result
-        The tool's summary; of a refused registration its verdict.
+        The tool's summary; of a refused registration its verdict. Of numbers all are finite.
     files
         Size in bytes and time in nanoseconds of the output files, by their paths.
     traceback
@@ -107,7 +108,8 @@ class Task:
             trace = traceback.format_exc()
         seconds = time.perf_counter() - started
         files = files_of((*self.outputs, *written))
-        return Outcome(status, message, seconds, result, files, trace)
+        # A number that is not finite is one row's, and must not cost the table of all rows.
+        return Outcome(status, message, seconds, plain(dict(result)), files, trace)
 
     def _call(self, written: list[Path]) -> dict[str, Any]:
         """Run the tool, return its summary, and add what it writes to a list."""

@@ -102,9 +102,10 @@ class RPC:
         px = np.empty((len(lon_lat), 2))
 
         def work(part: slice, terms: FloatArray) -> None:
-            fill_terms(self._normalised(lon_lat[part], height[part]), terms)
-            values = self._coefficients @ terms
+            # What lies outside of its map's projection is infinite.
             with np.errstate(all="ignore"):
+                fill_terms(self._normalised(lon_lat[part], height[part]), terms)
+                values = self._coefficients @ terms
                 ratio = values[:2] / values[2:]
             px[part] = ratio.T * self.image_scale + self.image_offset
 
