@@ -6,11 +6,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import rasterio
 from rpc_models import camera_rpc, write_dem, write_positions
 
 import groundtie
 from groundtie.errors import GeoreferencingError, GroundTieError, TooFewPointsError
 from groundtie.sensor.rpc_files import write_rpc
+from groundtie.sensor.rpc_tags import rpc_from_tags
 
 TRUTH = camera_rpc()
 BIAS = (12.0, -5.0)
@@ -68,6 +70,21 @@ def test_table_and_picture_are_written(files: dict[str, Path], tmp_path: Path) -
     picture = cv2.imread(str(tmp_path / "errors.png"))
     assert picture.shape[1] > picture.shape[0] > 300
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 10
+
+
+def test_a_picture_of_no_errors_is_drawn(files: dict[str, Path], tmp_path: Path) -> None:
+    with rasterio.open(files["image"]) as dataset:
+        rpc = rpc_from_tags(dataset.tags(ns="RPC"), "image")
+    lon_lat = rpc.localise([[100.0, 100.0], [400.0, 300.0]], 300.0)
+    px = rpc.project(lon_lat, 300.0)  # to the last digit what the image's RPCs see
+    lines = ["reference_x,reference_y,input_col,input_row,height_m,reference_crs"]
+    for (x, y), (col, row) in zip(lon_lat.tolist(), px.tolist(), strict=True):
+        lines.append(f"{x!r},{y!r},{col!r},{row!r},300.0,EPSG:4326")
+    files["check_points"].write_text("\n".join(lines))
+    picture = tmp_path / "errors.png"
+    result = groundtie.assess_sensor(**files, height=300.0, picture=picture)
+    assert (result.errors["before"].error_px == 0).all()
+    assert cv2.imread(str(picture)).shape[0] > 100
 
 
 def test_points_without_heights_take_the_grounds(files: dict[str, Path], tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import GeoreferencingError
 from ..rasters.atomic import write_csv, writing
 from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, reproject
-from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
+from ..report.figures import CHECK_COLOUR, FIT_COLOUR, SMALLEST_PX, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
 from .statistics import Statistics
@@ -110,7 +110,7 @@ def draw_vectors(
     for i, (name, each) in enumerate(errors.items()):
         axes = figure.add_subplot(1, len(errors), i + 1)
         length = np.hypot(*each.error_px.T)
-        unit = round_length(float(np.median(length)))
+        unit = round_length(max(float(np.median(length)), SMALLEST_PX))
         stretch = 0.1 * max(size) / unit
         col, row = points.points.input_px.T
         arrows = axes.quiver(

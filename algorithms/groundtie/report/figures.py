@@ -30,7 +30,7 @@ CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
 
 # The typical residual is no smaller than this.
-_SMALLEST_PX = 0.01
+SMALLEST_PX = 0.01
 
 _ROUND_NUMBERS = (1.0, 2.0, 5.0)
 
@@ -62,7 +62,7 @@ def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     which = errors.agreeing if enough else errors.used
     factor = 1.0
     if which.any():
-        typical = max(float(np.median(errors.length_px[which])), _SMALLEST_PX)
+        typical = max(float(np.median(errors.length_px[which])), SMALLEST_PX)
         factor = max(round_length(0.04 * side / typical), 1.0)
     return _arrows(errors.error_px, factor, side)
 
@@ -70,7 +70,7 @@ def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
 def scaled_arrows(by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
     """Exaggerate by a round factor so that what is long is no more than a tenth of the grid."""
     side = max(grid.width, grid.height)
-    factor = max(round_length(0.1 * side / max(longest_px, _SMALLEST_PX)), 1.0)
+    factor = max(round_length(0.1 * side / max(longest_px, SMALLEST_PX)), 1.0)
     return _arrows(by_px, factor, side)
 
 
