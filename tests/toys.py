@@ -31,6 +31,7 @@ from groundtie.kinds import (
     VectorOut,
 )
 from groundtie.progress import SILENT, Progress
+from groundtie.rasters.atomic import Outputs
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,8 @@ def toy(
     while mode == "wait":
         progress.check()
         time.sleep(0.01)
-    Path(output).write_bytes(b"done")
+    with Outputs() as outputs:
+        outputs.stage(output).write_bytes(b"done")
     progress.update(1.0)
     return ToyResult(values)
 

@@ -119,6 +119,16 @@ def test_a_number_that_is_not_finite_costs_no_other_row(
         assert [row["check_rmse_px"] for row in csv.DictReader(file)] == ["", ""]
 
 
+@pytest.mark.parametrize("mode", ["refuse", "crash"])
+def test_a_file_of_an_earlier_run_is_no_output(table: Path, mode: str) -> None:
+    folder = {"name": "x", "folder": "kept"}
+    assert run(table, folder).rows[0].outputs() == {"output": str(table.parent / "out/x.tif")}
+    (table.parent / "out/kept").mkdir()
+    again = run(table, {**folder, "mode": mode})
+    assert (table.parent / "out/x.tif").exists()
+    assert again.rows[0].outputs() == {} == again.rows[0].outcome.files
+
+
 def test_lines_tell_what_did_not_end_well(table: Path) -> None:
     lines = run(table, {}, *[{"mode": "refuse"}] * 22).lines()
     assert lines[0] == "23 rows: 1 done, 22 refused, 0 failed"

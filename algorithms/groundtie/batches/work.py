@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextvars import Context
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -40,7 +41,8 @@ class Outcome:
     result
         The tool's summary; of a refused registration its verdict. Of numbers all are finite.
     files
-        Size in bytes and time in nanoseconds of the output files, by their paths.
+        Size in bytes and time in nanoseconds of what the call wrote, by the paths; none of what
+        an earlier run left under these names.
     traceback
         Of a failure that is a bug.
     """
@@ -107,7 +109,7 @@ class Task:
             message = bug(error)
             trace = traceback.format_exc()
         seconds = time.perf_counter() - started
-        files = files_of((*self.outputs, *written))
+        files = files_of((*_among(self.outputs, written), *written))
         # A number that is not finite is one row's, and must not cost the table of all rows.
         return Outcome(status, message, seconds, plain(dict(result)), files, trace)
 
@@ -125,6 +127,12 @@ class Task:
 
         # A context of its own: files carry the id of this call (see `runs`), on any executor.
         return Context().run(run)
+
+
+def _among(outputs: Iterable[Path], written: Iterable[Path]) -> list[Path]:
+    """Return the outputs that were written: files, and folders that something came into."""
+    places = {place for path in written for place in (path, *path.parents)}
+    return [path for path in outputs if Path(os.path.abspath(path)) in places]
 
 
 def bug(error: Exception) -> str:
