@@ -19,7 +19,7 @@ from groundtie.batches.result import BatchResult
 from groundtie.batches.running import Reporter, duration
 from groundtie.batches.work import DONE, FAILED, REFUSED, Outcome, Task
 from groundtie.declaration import Tool
-from groundtie.errors import CancelledError, ParameterError
+from groundtie.errors import CancelledError, ParameterError, SameFileError
 from groundtie.progress import SILENT, Progress
 from groundtie.strict_json import parse_json
 
@@ -228,6 +228,16 @@ def test_a_worker_without_the_package_is_told(table: Path) -> None:
 
     result = run(table, {}, executor=Bare())
     assert "cannot import what it needs: No module named" in result.rows[0].outcome.message
+
+
+def test_a_row_that_would_write_the_log_costs_nothing(table: Path) -> None:
+    result = run(table, {})
+    log = table.parent / "out/1.tif"
+    batch = Batch(load_toy, "toy", table, log.parent, log)
+    before = [path.read_bytes() for path in (result.table, result.details, log)]
+    with pytest.raises(SameFileError, match="the batch and row 1 both write"):
+        batch.run(False, SILENT, Inline())
+    assert [path.read_bytes() for path in (result.table, result.details, log)] == before
 
 
 def test_an_unknown_table_costs_no_old_log(table: Path) -> None:

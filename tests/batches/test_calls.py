@@ -15,7 +15,7 @@ from rpc_models import camera_rpc
 from toys import TOY
 
 from groundtie.batches.calls import Call, make_calls
-from groundtie.errors import OutputError, ParameterError, SameFileError
+from groundtie.errors import ParameterError
 from groundtie.sensor.rpc_files import write_rpc
 from groundtie.tools import load_tool
 
@@ -96,18 +96,6 @@ def test_a_column_that_the_tool_does_not_know_is_an_error_of_the_table(
 ) -> None:
     with pytest.raises(ParameterError, match="a column colour, which toy does not know"):
         calls_of(folders, ROW, {**ROW, "colour": "red"})
-
-
-def test_two_rows_may_not_write_one_file(folders: tuple[Path, Path]) -> None:
-    row = {**ROW, "output": "c.tif"}
-    with pytest.raises(SameFileError, match=r"rows 1 and 2 both write .*c\.tif"):
-        calls_of(folders, row, {**row, "seed": 3, "output": "sub/../c.tif"})
-
-
-def test_no_row_may_write_what_another_reads(folders: tuple[Path, Path]) -> None:
-    other = {**ROW, "input": "c.tif", "output": str(folders[0] / "b.tif")}
-    with pytest.raises(OutputError, match="row 2 would write what row 1 reads"):
-        calls_of(folders, ROW, other)
 
 
 def test_the_key_stands_for_files_parameters_and_outputs(folders: tuple[Path, Path]) -> None:
@@ -216,19 +204,6 @@ def test_what_a_row_writes_beside_its_input_is_none_of_its_inputs(
     (after,) = make_calls(load_tool("refine_rpc"), [row], *folders, 1)
     assert before.problem == after.problem == ""
     assert after.key == before.key
-
-
-def test_what_lies_beside_an_output_is_no_other_rows(folders: tuple[Path, Path]) -> None:
-    pair = {"reference": "a.tif", "input": "b.tif"}
-    rows = [{**pair, "report": "r.html"}, {**pair, "transform": "r.json"}]
-    with pytest.raises(SameFileError, match="rows 1 and 2 both write"):
-        make_calls(load_tool("coregister"), rows, *folders, 1)
-
-
-def test_what_a_series_writes_is_no_input_of_another(folders: tuple[Path, Path]) -> None:
-    rows = [{"inputs": "a.tif;b.tif"}, {"inputs": [str(folders[1] / "1/series.json")]}]
-    with pytest.raises(OutputError, match="row 1 would write what row 2 reads"):
-        make_calls(load_tool("coregister_series"), rows, *folders, 1)
 
 
 def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> None:

@@ -17,6 +17,7 @@ from ..progress import Progress
 from ..rasters.atomic import make_folder
 from ..tables import read_rows
 from ..version import __version__
+from .apart import check_apart
 from .calls import Call, make_calls
 from .log import EventLog, open_log, read_finished, still_there
 from .result import BatchResult, BatchRow
@@ -73,7 +74,8 @@ class Batch:
         ParameterError
             The table cannot be read or understood.
         SameFileError, OutputError
-            A row writes what another one reads or writes; a file cannot be written.
+            A row writes what another one, or the batch itself, reads or writes; a file cannot be
+            written.
         SchedulerError
             The scheduler does not answer.
         """
@@ -87,6 +89,11 @@ class Batch:
         threads = max(1, processors // workers) if local else 1
         base, folder = Path(os.path.abspath(self.table)).parent, Path(os.path.abspath(self.folder))
         calls = make_calls(tool, rows, base, folder, threads)
+        log_path = Path(os.path.abspath(self.log))
+        summary, details = (
+            folder / f"{self.table.name}.results{ending}" for ending in (".csv", ".json")
+        )
+        check_apart(tool, calls, self.table, [log_path, summary, details])
         ended = self._known(calls, resume)
         resumed = {number for number, outcome in ended.items() if outcome.status != FAILED}
         # Connected to before the log begins: a scheduler that is not there costs no old log.
@@ -100,9 +107,9 @@ class Batch:
                 tool,
                 [BatchRow(call, ended[call.row], call.row in resumed) for call in calls],
                 time.monotonic() - started,
-                folder / f"{self.table.name}.results.csv",
-                folder / f"{self.table.name}.results.json",
-                Path(os.path.abspath(self.log)),
+                summary,
+                details,
+                log_path,
             )
             log.write("end", **result.counts, seconds=result.seconds)
         result.write()

@@ -1,16 +1,14 @@
-"""The calls that a table asks for: values checked as for a single call, and against each other."""
+"""The calls that a table asks for: values checked as for a single call."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ..call_paths import inputs_of
 from ..declaration import Parameter, Tool
-from ..errors import GroundTieError, OutputError, ParameterError, SameFileError
+from ..errors import GroundTieError, ParameterError
 from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
 from ..raster_names import raster_name
 from ..rasters.atomic import make_folder
@@ -75,8 +73,6 @@ def make_calls(
     ------
     ParameterError
         The table has a column that the tool does not know.
-    SameFileError
-        A row writes what another one reads or writes.
     """
     known = {parameter.name for parameter in tool.all_parameters}
     for name in {name: None for row in rows for name in row}:
@@ -91,7 +87,6 @@ def make_calls(
             calls.append(_call(tool, number, name, given, inputs, outputs))
         except GroundTieError as error:
             calls.append(Call(number, name, problem=error.one_line()))
-    _check_apart(tool, calls)
     return calls
 
 
@@ -111,7 +106,7 @@ def _call(
     written = {key: path for key, path in written.items() if path is not None}
     places = sorted((key, str(path)) for key, path in written.items())
     call = Call(number, name, checked, written)
-    read = facts_read(tool, checked, tuple(_files(tool, call)))
+    read = facts_read(tool, checked, tuple(files_written(tool, call)))
     return replace(call, key=digest(tool.run_of_call(checked), places, read))
 
 
@@ -158,26 +153,9 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
     return folder / value.replace("{name}", name)
 
 
-def _files(tool: Tool, call: Call) -> Iterator[Path]:
+def files_written(tool: Tool, call: Call) -> Iterator[Path]:
     """Yield all that a call writes, also what lies beside its outputs."""
     for name, path in call.outputs.items():
         kind = tool.parameter(name).kind
         assert isinstance(kind, WrittenKind)
         yield from (path, *kind.also_written(path))
-
-
-def _check_apart(tool: Tool, calls: Sequence[Call]) -> None:
-    """Raise if what a row writes is read or written by another: rows run in any order."""
-    writers: dict[Path, Call] = {}
-    for call in calls:
-        for path in _files(tool, call):
-            other = writers.setdefault(path.resolve(), call)
-            if other is not call:
-                raise SameFileError(f"rows {other.row} and {call.row} both write {path}")
-    for call in calls:
-        read = [inputs_of(p.kind, call.values.get(p.name)) for p in tool.parameters]
-        for value in chain.from_iterable(read):
-            if isinstance(value, Path) and (writer := writers.get(value.resolve())) is not None:
-                raise OutputError(
-                    f"row {writer.row} would write what row {call.row} reads: {value}"
-                )

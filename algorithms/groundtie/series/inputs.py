@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import ParameterError
@@ -146,6 +147,14 @@ def _standing_for(given: Path) -> list[Path]:
     if given.is_dir():
         return sorted(path for path in given.iterdir() if path.suffix.lower() in RASTER_SUFFIXES)
     return sorted(given.parent.glob(given.name)) if _is_pattern(given) else [given]
+
+
+def would_stand_for(given: Path, file: Path) -> bool:
+    """Return whether a folder or a pattern stands for a file, by its whole path, once it exists."""
+    if given.is_dir():
+        return file.parent == given.resolve() and file.suffix.lower() in RASTER_SUFFIXES
+    is_there = _is_pattern(given) and file.parent == given.parent.resolve()
+    return is_there and fnmatchcase(file.name, given.name)
 
 
 def _is_pattern(given: Path) -> bool:
