@@ -48,6 +48,12 @@ def test_a_file_of_that_very_name_comes_first(
     assert raster_name("s3:/a.tif") == Path("s3:/a.tif")
 
 
+def test_a_file_beside_the_one_that_names_it_comes_first(tmp_path: Path) -> None:
+    (tmp_path / "S1A:10.tif").touch()
+    assert located("S1A:10.tif", tmp_path / "t.csv") == tmp_path / "S1A:10.tif"
+    assert located("S1A:11.tif", tmp_path / "t.csv") == "S1A:11.tif"
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

@@ -38,14 +38,15 @@ _REMOTE = re.compile(
 )
 
 
-def raster_name(value: str | os.PathLike[str]) -> Path | str:
+def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Path | str:
     """Return what a name means: a `Path` of a file, or GDAL's own name as text.
 
     URLs become GDAL's names, also those that pathlib has shortened: `https://…` is read by
-    `/vsicurl/`, `s3://…` by `/vsis3/`, and so on. A file of that very name comes first.
+    `/vsicurl/`, `s3://…` by `/vsis3/`, and so on. A file of that very name comes first, in the
+    folder at which relative names begin: by default the working directory.
     """
     text = os.fspath(value)
-    if os.path.lexists(text):
+    if os.path.lexists(text if folder is None else folder / text):
         return Path(text)
     if url := _URL.match(text):
         kind, rest = url[2].lower(), text[url.end() :]
@@ -57,7 +58,7 @@ def raster_name(value: str | os.PathLike[str]) -> Path | str:
 
 def located(name: str, beside: Path | str) -> Path | str:
     """Return what a name means that stands in a file, relative to where that file lies."""
-    found = raster_name(name)
+    found = raster_name(name, beside.parent if isinstance(beside, Path) else None)
     if isinstance(found, str):
         return found
     if isinstance(beside, Path):

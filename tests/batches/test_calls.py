@@ -48,6 +48,18 @@ def test_paths_begin_at_their_folders(folders: tuple[Path, Path], tmp_path: Path
     assert (folders[1] / "sub").is_dir()
 
 
+def test_a_file_of_the_tables_folder_comes_before_gdals_names(
+    folders: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folders[0] / "S1A:10.tif").touch()
+    row = {**ROW, "input": "S1A:10.tif", "others": "S1A:10.tif;S1A:11.tif"}
+    for place in (tmp_path, folders[0]):
+        monkeypatch.chdir(place)
+        (call,) = calls_of(folders, row)
+        assert call.values["input"] == folders[0] / "S1A:10.tif"
+        assert call.values["others"] == (folders[0] / "S1A:10.tif", "S1A:11.tif")
+
+
 def test_required_outputs_have_the_names_of_their_rows(folders: tuple[Path, Path]) -> None:
     calls = calls_of(folders, *[{**ROW, "report": "{name}.html"}] * 9, {**ROW, "name": "Rome"})
     assert calls[0].outputs["output"] == folders[1] / "01.tif"

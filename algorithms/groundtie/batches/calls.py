@@ -132,7 +132,7 @@ def _located(value: Any, inputs: Path) -> Any:
     """Return an input's place; what is no name is left to the parameter's check."""
     if not isinstance(value, str) or not value or "\0" in value:
         return value
-    found = raster_name(value)
+    found = raster_name(value, inputs)
     return inputs / found if isinstance(found, Path) else found
 
 
