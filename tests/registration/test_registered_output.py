@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import rasterio
 from affine import Affine
-from raster_files import UTM, utm_grid
+from raster_files import UTM, utm_grid, wave_image, write_raster
+from rasterio import warp
 from rasterio.crs import CRS
+from rasterio.enums import Resampling
 from textured_pairs import TexturedPair, pixels, shift_on_map
 
 from groundtie.context import Context
@@ -16,6 +18,7 @@ from groundtie.geometry.models import KINDS, Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
+from groundtie.rasters.reading import open_raster
 from groundtie.registration.registered_output import (
     OUTPUT_GRIDS,
     RegisteredOutput,
@@ -106,3 +109,22 @@ def test_the_rows_of_a_grid_are_moved_and_no_pixel_changed(
     with rasterio.open(output.path) as out:
         expected = textured.truth.input_grid.shifted(-70.0, 45.0).transform
         assert out.transform.almost_equals(expected, 1e-6)
+
+
+def test_a_reference_grid_in_another_crs_than_the_transform_shows_the_same_ground(
+    tmp_path: Path, one_thread: Context
+) -> None:
+    zone_33 = CRS.from_epsg(32633)
+    path = write_raster(tmp_path / "in.tif", wave_image(GRID, 600.0).astype(np.float32), GRID)
+    left, top = reproject(GRID.pixel_to_map([GRID.centre_px]), UTM, zone_33)[0] + [-500, 400]
+    target = Grid(Affine(10, 0, left, 0, -10, top), zone_33, 100, 80)
+    expected = np.empty((80, 100), np.float32)
+    warp.reproject(
+        pixels(path)[0], expected, src_transform=GRID.transform, src_crs=UTM,
+        dst_transform=target.transform, dst_crs=zone_33, resampling=Resampling.cubic,
+    )  # fmt: skip
+    output = RegisteredOutput(tmp_path / "out.tif", "reference", "cubic")
+    with open_raster(path) as source, Outputs() as outputs:
+        output.write(source, target, Transform.nominal(UTM, GRID), outputs, one_thread)
+    # Waves of sixty pixels: GDAL's approximation of positions costs an eighth of one.
+    np.testing.assert_allclose(pixels(output.path)[0], expected, atol=0.5)

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import base64
 import datetime
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+from affine import Affine
+from raster_files import wave_image, write_raster
+from rasterio.crs import CRS
 from series_dates import FRAME, GRID, shifted
 
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.reading import open_raster
 from groundtie.registration.series_evidence import DateEvidence
 from groundtie.series.closure import Closure
+from groundtie.series.dates import Date
 from groundtie.series.inputs import Listed
 from groundtie.series.network import Adjustment
 from groundtie.series.report import SeriesReport, closure_figure, shift_figure
@@ -64,3 +74,22 @@ def test_the_worst_stands_first() -> None:
     assert [row["name"] for row in values["rows"]] == ["date-2", "date-1", "date-0"]
     assert values["rejected"] == ["date-0 – date-2"]
     assert (values["registered"], values["count"]) == (1, 2)
+
+
+def test_thumbnails_show_the_ground_on_a_map_of_another_crs(tmp_path: Path) -> None:
+    """Without a reference the rasters' grid is that of the hub, the frame's that of another."""
+    zone_33 = CRS.from_epsg(32633)
+    left, top = reproject(GRID.pixel_to_map([[0, 0]]), GRID.crs, zone_33)[0]
+    there = Grid(Affine(10, 0, left, 0, -10, top), zone_33, GRID.width, GRID.height)
+    path = write_raster(tmp_path / "a.tif", wave_image(GRID, 600.0).astype(np.float32), GRID)
+    found = series(list(DAYS))
+    with open_raster(path) as source:
+        date = Date(found.dates[1].listed, source, source, None)
+        one = replace(found.dates[1], date=date, transform=Transform.nominal(FRAME.grid.crs, GRID))
+        dates = (found.dates[0], one, found.dates[2])
+        report = SeriesReport.of(replace(found, dates=dates, map_grid=there))
+        (shown,) = report.values()["thumbnails"]
+    for uri in (shown.nominal, shown.registered):
+        data = np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
+        assert picture is not None and np.ptp(picture[50:-50, 50:-50].astype(int)) > 200

@@ -16,6 +16,7 @@ from ..errors import TransformFileError
 from ..rasters.grid import (
     FloatArray,
     Grid,
+    PointFunction,
     crs_from_text,
     crs_to_text,
     is_invertible,
@@ -63,6 +64,10 @@ class Transform:
         moved = self.model(positions.reshape(-1, 2))
         nominal = reproject(moved, self.crs, self.input_grid.crs)
         return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
+
+    def of_map(self, crs: CRS | None) -> PointFunction:
+        """Return the function from positions (n, 2) on a map of another CRS to input pixels."""
+        return lambda xy: self(reproject(xy, crs, self.crs))
 
     def nominal_xy(self, px: ArrayLike) -> FloatArray:
         """Return the nominal reference map positions of input pixels (col, row), (..., 2)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from ..geometry.transform import FloatArray, Transform
 from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import Grid, PointFunction, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT
@@ -60,9 +59,9 @@ class RegisteredOutput:
         source
             The raster that the transform is for.
         reference
-            The reference's own grid.
+            The reference's own grid; its CRS need not be that of the transform.
         transform
-            From reference map positions to the raster's pixels.
+            From map positions to the raster's pixels.
         outputs
             Where the file is staged.
         context
@@ -86,7 +85,7 @@ class RegisteredOutput:
 
 def resampled_onto(
     grid: str, source: RasterSource, reference: Grid, transform: Transform
-) -> tuple[Callable[[FloatArray], FloatArray], Grid]:
+) -> tuple[PointFunction, Grid]:
     """Return the grid of a registered raster, and what takes its map positions to pixels.
 
     Parameters
@@ -97,16 +96,13 @@ def resampled_onto(
         As `RegisteredOutput.write` takes them.
     """
     if grid == "reference":
-        return transform, reference
+        return transform.of_map(reference.crs), reference
     crs = source.grid.crs
 
     def px_to_own_map(px: FloatArray) -> FloatArray:
         return reproject(transform.inverse(px), transform.crs, crs)
 
-    def own_map_to_px(xy: FloatArray) -> FloatArray:
-        return transform(reproject(xy, crs, transform.crs))
-
-    return own_map_to_px, registered_grid(source.grid, px_to_own_map, crs)
+    return transform.of_map(crs), registered_grid(source.grid, px_to_own_map, crs)
 
 
 def grid_of_output(output: Path | None, asked: str) -> str:

@@ -83,12 +83,13 @@ class SeriesReport(Page):
             assert one.date is not None and one.transform is not None
             image = one.date.image()
             nominal = Transform.nominal(one.transform.crs, one.transform.input_grid)
+            to_px = [
+                pictures.overview_positions(transform.of_map(grid.crs), grid)
+                for transform in (nominal, one.transform)
+            ]
             uris = [
-                pictures.jpeg_uri(pictures.grey_picture(image.read_onto(grid, to_px)))
-                for to_px in (
-                    pictures.overview_positions(nominal, grid),
-                    pictures.overview_positions(one.transform, grid),
-                )
+                pictures.jpeg_uri(pictures.grey_picture(image.read_onto(grid, positions)))
+                for positions in to_px
             ]
             time = one.listed.time
             found.append(Thumbnail(one.name, "" if time is None else f"{time:%Y-%m-%d}", *uris))
