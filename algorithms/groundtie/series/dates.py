@@ -91,11 +91,16 @@ class Date:
             return True
         return variation2_of(self.image()) >= LEAST_VARIATION2
 
+    @property
+    def facts(self) -> tuple[Any, ...]:
+        """What its pixels and their place come from; a sidecar may move them."""
+        return *file_facts(self.listed.raster), self.source.grid.to_json()
+
     @cached_property
     def key(self) -> str:
-        """Stands for the file by name, size and time of its last change, and for the mask's."""
+        """Stands for the file by name, size and time, for its georeferencing, and for the mask."""
         mask = self.listed.mask
-        facts: list[Any] = [file_facts(self.listed.raster)]
+        facts: list[Any] = [self.facts]
         facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
         return digest(*facts)
 

@@ -21,7 +21,6 @@ from ..registration.verdict import Verdict
 from ..report.stac import stac_item
 from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
-from .dates import file_facts
 from .frame import FloatArray, sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import SERIES_JSON, StoredSeries, forget_unfinished
@@ -74,7 +73,8 @@ class SeriesFiles:
 
     def raster_key(self, date: SeriesDate, series: Series) -> str:
         """Return what stands for all that a date's raster is made of but its transform."""
-        facts = file_facts(date.listed.raster), series.map_grid, self.output_grid, self.resampling
+        assert date.date is not None
+        facts = date.date.facts, series.map_grid, self.output_grid, self.resampling
         return digest(facts, __version__)
 
     def _with_rasters(

@@ -1,0 +1,60 @@
+"""The dates of a series as they are opened, and what stands for them from one run to the next."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import utm_grid, write_raster
+from series_dates import FRAME
+from textured_pairs import texture
+
+from groundtie.context import Context
+from groundtie.series.dates import open_dates
+from groundtie.series.delivery import SeriesFiles
+from groundtie.series.inputs import Listed
+from groundtie.series.pairs import Settings, pair_key
+from groundtie.series.series import Series, SeriesDate
+from groundtie.series.settling import DateVerdict, Settled, settle
+
+SIZE = 40
+GRID = utm_grid(SIZE, SIZE)
+SETTINGS = Settings("auto", 3.0, None, None)
+
+
+def keys(folder: Path, context: Context) -> tuple[str, str, str]:
+    """Return the keys of the second date, of its registration and of its registered raster."""
+    listed = [Listed(name, folder / f"{name}.tif", None) for name in "ab"]
+    with ExitStack() as stack:
+        (first, second), failures = open_dates(listed, None, stack, context)
+        assert not failures
+        settled: Settled = settle(FRAME, {}, 2, 0, is_free=True)
+        series = Series((), FRAME, GRID, "", (), settled, ("a", "b"), None, 0, 0, {})
+        files = SeriesFiles(folder / "out", "reference", "cubic", None)
+        one = SeriesDate(second.listed, DateVerdict(True, ""), second)
+        pair = pair_key(first, second, SETTINGS, FRAME)
+        return second.key, pair, files.raster_key(one, series)
+
+
+@pytest.mark.parametrize("changed", ["geotransform", "crs"])
+def test_georeferencing_that_a_sidecar_changes_is_another_date(
+    tmp_path: Path, one_thread: Context, changed: str
+) -> None:
+    """The file stays as it is: its name, its size and its time are those of before."""
+    for name in "ab":
+        write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32))
+        sidecar(tmp_path / f"{name}.tif", "EPSG:32632", 500_000)
+    before = keys(tmp_path, one_thread)
+    assert keys(tmp_path, one_thread) == before
+    crs, left = ("EPSG:32632", 500_030) if changed == "geotransform" else ("EPSG:32633", 500_000)
+    sidecar(tmp_path / "b.tif", crs, left)
+    after = keys(tmp_path, one_thread)
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def sidecar(path: Path, crs: str, left: int) -> None:
+    """Write georeferencing into the file of GDAL beside a raster."""
+    place = f"<SRS>{crs}</SRS><GeoTransform>{left},10,0,5000000,0,-10</GeoTransform>"
+    path.with_name(f"{path.name}.aux.xml").write_text(f"<PAMDataset>{place}</PAMDataset>")
