@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from affine import Affine
 from raster_files import utm_grid
+from rasterio.crs import CRS
 from series_dates import FRAME, GRID
 
+from groundtie.rasters.grid import Grid
 from groundtie.series.frame import SeriesFrame, rms_px, sigma_px
 
 DISPLACEMENT = np.array([3.0, -2.0, 0.4, 0.1, -0.2, 0.6])
@@ -58,3 +63,16 @@ def test_a_date_is_moved_to_its_ground() -> None:
     # What nominally lies 3 px to the right, 2 px up, belongs 30 m to the west and 20 m south.
     assert moved.transform.c - GRID.transform.c == pytest.approx(-30.0)
     assert moved.transform.f - GRID.transform.f == pytest.approx(-20.0)
+
+
+def test_a_frame_is_of_the_hub_that_it_was_made_around() -> None:
+    dates = [utm_grid(120, 90, 25.0), utm_grid(120, 90, 25.0)]
+    other = Grid(GRID.transform, CRS.from_epsg(32633), GRID.width, GRID.height)
+    for frame in (FRAME, SeriesFrame.around(GRID, dates)):
+        stored = SeriesFrame.from_json(json.loads(json.dumps(frame.to_json())))
+        assert stored.is_of(GRID)
+        for grid in (GRID.shifted(10, 0), GRID.window(0, 0, 200, 300), other, GRID.scaled(4)):
+            assert not stored.is_of(grid)
+    degrees = Grid(Affine(1e-4, 0, 9.0, 0, -1e-4, 45.1), CRS.from_epsg(4326), 100, 70)
+    assert SeriesFrame.around(degrees, dates).is_of(degrees)
+    assert not FRAME.is_of(degrees)

@@ -127,7 +127,7 @@ class SeriesCall:
         home = dates[hub or 0]
         key = None if hub is None else home.key
         frame = stored.frames.get(key)  # that of the registrations which need not be done again
-        if frame is None:
+        if frame is None or not frame.is_of(home.source.grid):
             frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
         footprints = [date.footprint(frame.grid.crs) for date in dates]
         matching = Matching(

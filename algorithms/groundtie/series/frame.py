@@ -20,6 +20,9 @@ PARAMETERS = 6
 # Positions a side of the square at which a move is sampled: a plane needs two, bends average out.
 _LATTICE = 5
 
+# Corners of grids that are the same differ by rounding alone.
+_SAME_PX = 1e-6
+
 # A displacement with less of a linear part, at the frame's border, is a shift.
 SHIFT_PX = 1e-6
 
@@ -76,6 +79,14 @@ class SeriesFrame:
         centre = (low + high) / 2
         half = float((high - low).max() / 2)
         return cls(grid, (float(centre[0]), float(centre[1])), half)
+
+    def is_of(self, hub: Grid) -> bool:
+        """Return whether it is around a hub of this grid, however large its pixels were made."""
+        factor = self.grid.pixel_size[0] / hub.pixel_size[0]
+        made = hub.scaled(max(factor, 1.0))
+        corners = self.grid.map_to_pixel(made.pixel_to_map(made.outline(1)))
+        is_there = np.allclose(corners, self.grid.outline(1), rtol=0, atol=_SAME_PX)
+        return is_there and (made.crs, made.width) == (self.grid.crs, self.grid.width)
 
     def enter(self, xy: FloatArray) -> FloatArray:
         """Return map positions, shape (n, 2), in units of the square."""

@@ -1,0 +1,65 @@
+"""Folders of series that are used again, where registrations are made up: no pixel is matched."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from affine import Affine
+from raster_files import UTM, write_raster
+from rasterio.crs import CRS
+from textured_pairs import texture
+
+from groundtie.rasters.grid import Grid
+from groundtie.series import registering
+from groundtie.series.pairs import PairResult, PairTask, pair_key
+from groundtie.tools.coregister_series import coregister_series
+
+SIZE = 64
+PRECISE = tuple(tuple(1e-4 * (i == j) for j in range(6)) for i in range(6))
+
+
+def register(task: PairTask, *_: Any) -> PairResult:
+    """Accept a pair as it lies."""
+    key = pair_key(task.first, task.second, task.settings, task.frame)
+    names = task.first.name, task.second.name
+    return PairResult(*names, key, True, "", "yes", 0.3, (0.0,) * 6, PRECISE)
+
+
+@pytest.fixture(autouse=True)
+def _made_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registering, "register_pair", register)
+
+
+def dates_at(folder: Path, crs: CRS, left: float, *names: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    grid = Grid(Affine(10, 0, left, 0, -10, 5_000_000), crs, SIZE, SIZE)
+    for name in names:
+        write_raster(folder / f"{name}.tif", 100 + 10 * texture(SIZE, SIZE).astype("f4"), grid)
+    return folder
+
+
+def frame_of(folder: Path) -> Any:
+    return json.loads((folder / "series.json").read_text())["frame"]
+
+
+def test_another_series_in_a_folder_has_a_frame_of_its_own(tmp_path: Path) -> None:
+    """Without a reference, a series is known by the place of its first date alone."""
+    out = tmp_path / "out"
+    there = dates_at(tmp_path / "there", CRS.from_epsg(32635), 300_000, "c", "d")
+    coregister_series(out, [dates_at(tmp_path / "here", UTM, 500_000, "a", "b")])
+    coregister_series(out, [there])
+    coregister_series(tmp_path / "alone", [there])
+    assert frame_of(out) == frame_of(tmp_path / "alone")
+    assert CRS.from_wkt(frame_of(out)["crs"]) == CRS.from_epsg(32635)
+
+
+def test_a_further_date_does_not_change_the_frame(tmp_path: Path) -> None:
+    out, dates = tmp_path / "out", dates_at(tmp_path / "dates", UTM, 500_000, "a", "b", "c")
+    coregister_series(out, [dates])
+    before = frame_of(out)
+    dates_at(dates, UTM, 500_100, "d", "e", "f")
+    found = coregister_series(out, [dates])
+    assert frame_of(out) == before and found.reused_pairs > 0
