@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from ..context import Context, threads
-from ..errors import CancelledError, GroundTieError, WorkerLostError
+from ..errors import (
+    CancelledError,
+    GroundTieError,
+    MemoryLimitError,
+    OutputError,
+    RasterOpenError,
+    WorkerLostError,
+)
 from ..executors import enter_worker
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
@@ -34,6 +41,9 @@ from .network import Link
 # Two images of one kind of camera show the same gradients: orientation alone finds as many matches
 # as all measures together, in half of the time (suite series).
 _CAMERAS = replace(COREGISTER, similarity="orientation")
+
+# What another time, or another machine, may not fail for: a full disk, a network, memory.
+_PASSING = (MemoryLimitError, OutputError, RasterOpenError)
 
 
 @dataclass(frozen=True)
@@ -85,8 +95,8 @@ class PairResult:
     first, second
         Names of the dates: reference and input.
     key
-        Stands for the files, the settings and the version; empty: whoever did it was lost, so that
-        it is done again in the next run.
+        Stands for the files, the settings and the version; empty: it failed for what may pass, so
+        that it is done again in the next run.
     accepted, rule, reason
         The verdict.
     check_rmse_px
@@ -172,7 +182,7 @@ class PairTask:
 
     def lost(self, error: WorkerLostError) -> PairResult:
         """Return what became of it if the worker that did it was lost."""
-        return PairResult(self.first.name, self.second.name, "", False, "", error.one_line())
+        return _failed(self.first.name, self.second.name, error.one_line())
 
     def elsewhere(self) -> Callable[[], PairResult]:
         """Return the task for another process: with files, not pixels."""
@@ -190,10 +200,16 @@ def _register_files(
     with threads(1) as context, ExitStack() as stack:
         dates, failures = open_dates(listed, band, stack, context)
         if failures:
-            reason = "; ".join(failures.values())
-            return PairResult(listed[0].name, listed[1].name, key, False, "", reason)
+            # Whoever asked for the pair could open both.
+            return _failed(listed[0].name, listed[1].name, "; ".join(failures.values()))
         first, second = dates
-        return replace(register_pair(PairTask(first, second, *bare), context), key=key)
+        found = register_pair(PairTask(first, second, *bare), context)
+        return replace(found, key=key) if found.key else found
+
+
+def _failed(first: str, second: str, reason: str) -> PairResult:
+    """Return what became of a registration that the next run does again."""
+    return PairResult(first, second, "", False, "", reason)
 
 
 def register_pair(task: PairTask, context: Context) -> PairResult:
@@ -229,7 +245,8 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
         raise
     except GroundTieError as error:
         # Of this pair alone: the date is named with it, and the others stand.
-        return replace(refused, reason=error.one_line(), seconds=time.perf_counter() - started)
+        failed = replace(refused, key="") if isinstance(error, _PASSING) else refused
+        return replace(failed, reason=error.one_line(), seconds=time.perf_counter() - started)
     verdict = found.verdict
     rmse = verdict.check_rmse_px
     judged = replace(

@@ -243,7 +243,7 @@ class Matching:
         self.results.pop(ends[::-1], None)
         self.results[ends] = result
         self.done += 1
-        if result.key:  # none: whoever did it was lost
+        if result.key:  # none: it failed for what may pass
             self.keep(result)
 
     def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
