@@ -12,6 +12,7 @@ from series_dates import FRAME
 from textured_pairs import texture
 
 from groundtie.context import Context
+from groundtie.series import dates
 from groundtie.series.dates import open_dates
 from groundtie.series.delivery import SeriesFiles
 from groundtie.series.inputs import Listed
@@ -52,6 +53,24 @@ def test_georeferencing_that_a_sidecar_changes_is_another_date(
     sidecar(tmp_path / "b.tif", crs, left)
     after = keys(tmp_path, one_thread)
     assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+@pytest.mark.parametrize("most_bytes", [0, 10**9])
+def test_a_truncated_date_is_left_out_alone_whether_held_or_not(
+    tmp_path: Path, one_thread: Context, monkeypatch: pytest.MonkeyPatch, most_bytes: int
+) -> None:
+    monkeypatch.setattr(dates, "dates_bytes", lambda: most_bytes)
+    paths = [
+        write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+        for name in "abc"
+    ]
+    paths[1].write_bytes(paths[1].read_bytes()[: -2 * SIZE * SIZE])
+    listed = [Listed(path.stem, path, None) for path in paths]
+    with ExitStack() as stack:
+        found, failures = open_dates(listed, None, stack, one_thread)
+        assert [date.name for date in found] == ["a", "c"]
+        assert [date.footprint(GRID.crs).area for date in found] == [(10.0 * SIZE) ** 2] * 2
+    assert failures.keys() == {"b"} and "b.tif" in failures["b"]
 
 
 def sidecar(path: Path, crs: str, left: int) -> None:

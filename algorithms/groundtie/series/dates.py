@@ -21,7 +21,7 @@ from ..context import Context
 from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
 from ..memory import dates_bytes
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
@@ -104,8 +104,19 @@ class Date:
         facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
         return digest(*facts)
 
-    def footprint(self, crs: CRS | None) -> Any:
-        """Return the outline of its valid pixels as a shapely polygon on a map."""
+    def read(self, with_footprint: bool) -> None:
+        """Read what the series asks of the date, so that what fails is the date and not the series.
+
+        Parameters
+        ----------
+        with_footprint
+            Whether that is asked for, too; it takes all pixels.
+        """
+        _ = self.is_radar, with_footprint and self.rings
+
+    @cached_property
+    def rings(self) -> list[FloatArray]:
+        """Outlines of its valid pixels on its own map, each of shape (n, 2)."""
         grid = self.matched.grid
         small = overview_grid(grid, _FOOTPRINT_PX)
         _, valid = self.matched.read(
@@ -116,14 +127,22 @@ class Date:
             for geometry, value in shapes(valid.astype(np.uint8), transform=small.transform)
             if value
         ]
-        rings = [polygon.exterior.coords for polygon in found]
-        moved = [Polygon(reproject(np.array(ring), grid.crs, crs)) for ring in rings]
+        return [np.array(polygon.exterior.coords) for polygon in found]
+
+    def footprint(self, crs: CRS | None) -> Any:
+        """Return the outline of its valid pixels as a shapely polygon on a map."""
+        moved = [Polygon(reproject(ring, self.source.grid.crs, crs)) for ring in self.rings]
         sound = [polygon.buffer(0) for polygon in moved if np.isfinite(polygon.bounds).all()]
         return unary_union(sound)
 
 
 def open_dates(
-    listed: Sequence[Listed], band: int | None, stack: ExitStack, context: Context
+    listed: Sequence[Listed],
+    band: int | None,
+    stack: ExitStack,
+    context: Context,
+    *,
+    with_footprints: bool = True,
 ) -> tuple[list[Date], dict[str, str]]:
     """Open the rasters of a series; one that cannot be read is left out.
 
@@ -139,6 +158,8 @@ def open_dates(
         Keeps the rasters open.
     context
         Progress.
+    with_footprints
+        Whether footprints will be asked for.
     """
     dates: list[Date] = []
     failures: dict[str, str] = {}
@@ -155,6 +176,7 @@ def open_dates(
             date = Date(one, source, source, band, mask)
             if held_bytes <= most_bytes:
                 date = replace(date, matched=held_grey(source, band))
+            date.read(with_footprints)
             dates.append(date)
         except CancelledError:
             raise

@@ -198,7 +198,7 @@ def _register_files(
 ) -> PairResult:
     enter_worker()
     with threads(1) as context, ExitStack() as stack:
-        dates, failures = open_dates(listed, band, stack, context)
+        dates, failures = open_dates(listed, band, stack, context, with_footprints=False)
         if failures:
             # Whoever asked for the pair could open both.
             return _failed(listed[0].name, listed[1].name, "; ".join(failures.values()))
