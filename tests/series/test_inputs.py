@@ -167,3 +167,47 @@ def test_an_empty_folder_and_two_dates_of_one_name(tmp_path: Path) -> None:
     touched(tmp_path / "y", "a.tif")
     with pytest.raises(ParameterError, match="two dates are called a"):
         list_dates([tmp_path / "x", tmp_path / "y"], None)
+
+
+@pytest.mark.parametrize("name", ["../a", "x/a", "x\\a", "/a", ".", "..", "a\0"])
+@pytest.mark.parametrize("source", ["table", "item"])
+def test_a_name_that_leads_out_of_the_folder_is_refused(
+    tmp_path: Path, name: str, source: str
+) -> None:
+    """A raster is written under each date's name."""
+    if source == "table":
+        path = tmp_path / "dates.csv"
+        path.write_text(f"file,name\nb.tif,fine\na.tif,{name}\n")
+    else:
+        path = tmp_path / "item.json"
+        named = {**item(1, red={"href": "a.tif", "type": TIFF}), "id": name}
+        path.write_text(json.dumps(named))
+    with pytest.raises(ParameterError, match=r"a\.tif .*cannot name a file") as caught:
+        list_dates([path], None)
+    assert caught.value.one_line().isprintable()
+
+
+def test_dots_within_a_name_lead_nowhere(tmp_path: Path) -> None:
+    table = tmp_path / "dates.csv"
+    table.write_text("file,name\na.tif,v1.2..b\nb.tif,...\n")
+    assert [date.name for date in list_dates([table], None)] == ["v1.2..b", "..."]
+
+
+def test_a_file_that_two_rows_name_differently_is_refused(tmp_path: Path) -> None:
+    table = tmp_path / "dates.csv"
+    table.write_text("file,name\na.tif,first\nb.tif,other\n./a.tif,second\n")
+    with pytest.raises(ParameterError, match=r"a\.tif is called first and second"):
+        list_dates([table], None)
+    (path,) = touched(tmp_path / "x", "c.tif")
+    table.write_text("file,name\nx/c.tif,first\n")
+    with pytest.raises(ParameterError, match="is called c and first"):
+        list_dates([path.parent, table], None)
+
+
+def test_a_file_that_is_named_again_as_it_was_is_one_date(tmp_path: Path) -> None:
+    """What the table names, the folder only holds."""
+    (path,) = touched(tmp_path / "x", "c.tif")
+    table = tmp_path / "dates.csv"
+    table.write_text("file,name\nx/c.tif,first\nx/c.tif,first\n")
+    assert [date.name for date in list_dates([table, path.parent, path], None)] == ["first"]
+    assert [date.name for date in list_dates([path.parent, path], None)] == ["c"]

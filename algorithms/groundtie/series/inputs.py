@@ -69,13 +69,18 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
     Raises
     ------
     ParameterError
-        There is nothing under a name, a table or an item cannot be understood, or two dates have
-        one name.
+        There is nothing under a name, a table or an item cannot be understood, two dates have one
+        name or one has two, or a name cannot be that of a file.
     """
     found: dict[object, Listed] = {}
     for given in inputs:
         for date in _listed(given, asset):
-            found.setdefault(identity(date.raster), date)
+            _require_file_name(date)
+            other = found.setdefault(identity(date.raster), date)
+            if date.name not in (other.name, _own_name(date.raster)):
+                raise ParameterError(
+                    f"{date.raster} is called {other.name} and {date.name}; name it once"
+                )
     # What lies beside an image as its mask is no date, though its folder names it.
     for mask in [date.mask for date in found.values() if date.mask is not None]:
         if mask.origin:
@@ -161,8 +166,20 @@ def _is_pattern(given: Path) -> bool:
     return any(sign in given.name for sign in "*?[") and not given.exists()
 
 
+def _require_file_name(date: Listed) -> None:
+    """Raise an error for a name that somebody gave and no file in the output folder can have."""
+    if date.name == _own_name(date.raster):
+        return
+    if date.name in (".", "..") or any(sign in date.name for sign in "/\\\0"):
+        raise ParameterError(f"{date.raster} is called {date.name!r}, which cannot name a file")
+
+
+def _own_name(raster: Path | str) -> str:
+    return Path(file_name(raster)).stem
+
+
 def _file(raster: Path | str) -> Listed:
-    stem = Path(file_name(raster)).stem
+    stem = _own_name(raster)
     return Listed(stem, raster, time_of(stem), UserMask.of(raster, None, None))
 
 
