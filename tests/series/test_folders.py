@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ from raster_files import UTM, write_raster
 from rasterio.crs import CRS
 from textured_pairs import texture
 
+from groundtie.errors import NotRegisteredError
 from groundtie.rasters.grid import Grid
 from groundtie.series import registering
 from groundtie.series.pairs import PairResult, PairTask, pair_key
 from groundtie.tools.coregister_series import coregister_series
 
 SIZE = 64
+TABLES = {"series.csv", "series.gpkg", "series.json"}
 PRECISE = tuple(tuple(1e-4 * (i == j) for j in range(6)) for i in range(6))
 
 
@@ -63,3 +66,38 @@ def test_a_further_date_does_not_change_the_frame(tmp_path: Path) -> None:
     dates_at(dates, UTM, 500_100, "d", "e", "f")
     found = coregister_series(out, [dates])
     assert frame_of(out) == before and found.reused_pairs > 0
+
+
+def refuse(task: PairTask, *_: Any) -> PairResult:
+    """Refuse a pair."""
+    key = pair_key(task.first, task.second, task.settings, task.frame)
+    return PairResult(task.first.name, task.second.name, key, False, "a rule", "no")
+
+
+def test_a_series_that_is_refused_leaves_nothing_of_an_earlier_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies there must not seem to be registered; what others put there stays."""
+    out, dates = tmp_path / "out", dates_at(tmp_path / "dates", UTM, 500_000, "a", "b")
+    coregister_series(out, [dates])
+    names = {f"{name}_registered.cog.tif" for name in "ab"}
+    assert {path.name for path in out.iterdir()} == {*names, *TABLES}
+    (out / "notes.txt").write_text("mine")
+    # Another program wrote it anew: it is no raster of this series any more.
+    shutil.copy(dates / "a.tif", out / "a_registered.cog.tif")
+    monkeypatch.setattr(registering, "register_pair", refuse)
+    with pytest.raises(NotRegisteredError):
+        coregister_series(out, [dates], max_error=1.0)
+    assert {path.name for path in out.iterdir()} == {"notes.txt", "a_registered.cog.tif"}
+
+
+def test_a_series_that_is_refused_leaves_the_files_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, dates = tmp_path / "out", dates_at(tmp_path / "dates", UTM, 500_000, "a", "b")
+    out.mkdir()
+    (out / "series.csv").write_text("mine")
+    monkeypatch.setattr(registering, "register_pair", refuse)
+    with pytest.raises(NotRegisteredError):
+        coregister_series(out, [dates])
+    assert [path.name for path in out.iterdir()] == ["series.csv"]

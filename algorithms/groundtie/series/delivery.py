@@ -48,7 +48,9 @@ class SeriesFiles:
     report: Path | None
 
     def write(self, series: Series, stored: StoredSeries, context: Context) -> Series:
-        """Write all files, or those of a series without registered dates: the report.
+        """Write all files, or those of a series without registered dates: the report alone.
+
+        What an earlier run left of dates that are not registered any more is removed.
 
         Raises
         ------
@@ -57,6 +59,8 @@ class SeriesFiles:
         """
         if not series.registered:
             self._write_refusal(series)
+            self._remove_stale(series, stored)
+            self._remove_tables()
             forget_unfinished(self.folder)
             raise _refusal(series)
         make_folder(self.folder)
@@ -149,7 +153,16 @@ class SeriesFiles:
         current = {one["file"] for one in series.written.values()}
         for one in stored.dates.values():
             if one.file not in current and one.is_there(self.folder):
-                (self.folder / one.file).unlink()
+                with writing(self.folder / one.file):
+                    (self.folder / one.file).unlink()
+
+    def _remove_tables(self) -> None:
+        """Remove what an earlier run stated of the series, if there was one."""
+        if (self.folder / SERIES_JSON).exists():
+            # That file last: with it the next run finds what there is to remove.
+            for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
+                with writing(self.folder / name):
+                    (self.folder / name).unlink(missing_ok=True)
 
 
 def _write_layer(path: Path, series: Series) -> None:
