@@ -63,6 +63,18 @@ def test_to_a_file_and_back(tmp_path: Path, suffix: str, crs: CRS | None, grid: 
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("datum", ["+ellps=intl", "+ellps=WGS84 +towgs84=100,200,50"])
+def test_the_datum_is_kept(tmp_path: Path, suffix: str, datum: str) -> None:
+    crs = CRS.from_user_input(f"+proj=utm +zone=32 {datum} +units=m")
+    points, transform = made(crs, DEGREES)
+    write_tie_points(tmp_path / f"a{suffix}", points, transform)
+    found = read_tie_points(tmp_path / f"a{suffix}", DEGREES)
+    assert found.crs == crs
+    # There and back between the datums leads mm away; another datum would by 10 px.
+    np.testing.assert_allclose(found.input_px, points.input_px, atol=1e-3)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_a_table_without_points(tmp_path: Path, suffix: str) -> None:
     points, transform = made(UTM, GRID)
     write_tie_points(tmp_path / f"a{suffix}", points.take(np.zeros(12, bool)), transform)

@@ -11,9 +11,22 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose, reproject
+from groundtie.rasters.grid import (
+    PIXEL_COORDINATES,
+    Grid,
+    apply_affine,
+    compose,
+    crs_name,
+    epsg_of,
+    reproject,
+)
 
 WGS84 = CRS.from_epsg(4326)
+# GDAL names EPSG:23033 and EPSG:32633 for them: other datums.
+NEAR_CODES = (
+    "+proj=utm +zone=33 +ellps=intl +units=m",
+    "+proj=utm +zone=33 +ellps=WGS84 +towgs84=100,200,50 +units=m",
+)
 coordinate = st.floats(-1e5, 1e5)
 
 
@@ -149,3 +162,12 @@ def test_of_composed_transforms_the_last_is_applied_first() -> None:
     expected = apply_affine(move, apply_affine(turn, apply_affine(scale, points)))
     np.testing.assert_allclose(apply_affine(compose(move, turn, scale), points), expected)
     assert compose(move) == move
+
+
+@pytest.mark.parametrize("text", [*NEAR_CODES, "EPSG:32633", "EPSG:4326", "ESRI:102003"])
+def test_the_name_of_a_crs_means_no_other(text: str) -> None:
+    crs = CRS.from_user_input(text)
+    assert CRS.from_user_input(crs_name(crs)) == crs
+    if text not in NEAR_CODES:
+        assert crs_name(crs) == text
+    assert epsg_of(crs) == (int(text[5:]) if text.startswith("EPSG") else None)

@@ -66,8 +66,12 @@ def test_the_fields_are_those_of_the_extensions(tmp_path: Path) -> None:
     assert asset["type"] == "image/tiff; application=geotiff; profile=cloud-optimized"
 
 
-def test_a_crs_without_a_code_is_wkt(tmp_path: Path) -> None:
-    own = CRS.from_proj4("+proj=laea +lat_0=48 +lon_0=9 +units=m +ellps=GRS80")
+@pytest.mark.parametrize(
+    "text",
+    ["+proj=laea +lat_0=48 +lon_0=9 +ellps=GRS80", "+proj=utm +zone=32 +ellps=intl +units=m"],
+)
+def test_a_crs_without_a_code_is_wkt(tmp_path: Path, text: str) -> None:
+    own = CRS.from_proj4(text)
     found = item(tmp_path, replace(GRID, transform=Affine(10, 0, 0, 0, -10, 0), crs=own))
     fields = found["properties"]
     assert isinstance(fields, dict) and fields["proj:epsg"] is None

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +93,14 @@ def test_gdal_takes_its_options(tmp_path: Path, located: tuple[Orientation, Grid
     np.testing.assert_allclose(numbers[:, :2], kept.points.input_px + 0.5, atol=1e-5)
     np.testing.assert_allclose(numbers[:, 2:4], kept.points.reference_xy, atol=1e-6)
     np.testing.assert_allclose(numbers[:, 4], kept.height_m, atol=1e-3)
+
+
+def test_gdal_is_told_the_datum(tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
+    """GDAL takes backslashes within double quotes as a shell does."""
+    own = CRS.from_user_input("+proj=utm +zone=32 +ellps=intl +units=m")
+    replace(some_points(located[0]), crs=own).write(tmp_path / "gcps.txt", *located)
+    option, text = shlex.split((tmp_path / "gcps.txt").read_text().splitlines()[0])
+    assert option == "-a_srs" and CRS.from_user_input(text) == own
 
 
 def test_lines_lead_from_where_the_rpcs_see_a_point(

@@ -16,7 +16,7 @@ from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
 from ..rasters.atomic import write_csv, write_json, writing
-from ..rasters.grid import LON_LAT, FloatArray, Grid, reproject, require_map
+from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject, require_map
 from ..runs import run_tags
 from ..strict_json import read_json
 from .drawn_points import follow_lines, line_ends
@@ -150,7 +150,7 @@ def _suffix(path: Path, verb: str, error: type[OutputError | TransformFileError]
 
 def _rows(points: TiePoints, transform: Transform) -> list[Row]:
     columns = {**tie_point_columns(points, transform), **points.more}
-    crs = "" if transform.crs is None else transform.crs.to_string()
+    crs = "" if transform.crs is None else crs_name(transform.crs)
     texts = {"reference_crs": crs, **run_tags()}
     return [
         dict(zip(columns, values, strict=True)) | texts

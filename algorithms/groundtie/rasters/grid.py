@@ -262,6 +262,20 @@ def require_both_or_none(one: CRS | None, other: CRS | None, names: str) -> None
 _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
 
 
+def epsg_of(crs: CRS) -> int | None:
+    """Return the EPSG code of exactly this CRS; None: there is none."""
+    code = crs.to_epsg()
+    return code if code is not None and CRS.from_epsg(code) == crs else None
+
+
+def crs_name(crs: CRS) -> str:
+    """Return a short text that means exactly this CRS: its code, else its WKT."""
+    # GDAL's code may be the nearest one, which has another datum than an unknown one, or one with
+    # parameters of its own.
+    name = str(crs.to_string())
+    return name if CRS.from_user_input(name) == crs else str(crs.to_wkt())
+
+
 def crs_to_text(crs: CRS | None) -> str | None:
     """Return a CRS as text that files can carry."""
     return None if crs is None else str(crs.to_wkt())

@@ -13,7 +13,7 @@ import numpy as np
 from ..geometry.transform import Transform
 from ..kinds import GEOTIFF
 from ..raster_names import file_name
-from ..rasters.grid import LON_LAT, Grid, reproject
+from ..rasters.grid import LON_LAT, Grid, epsg_of, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES
 from ..registration.verdict import Verdict
@@ -96,7 +96,7 @@ def quality_of(verdict: Verdict, transform: Transform) -> dict[str, Any]:
 def _projection(grid: Grid) -> dict[str, Any]:
     assert grid.crs is not None
     corners = grid.pixel_to_map(grid.outline(1))
-    code = grid.crs.to_epsg()
+    code = epsg_of(grid.crs)
     return {
         "proj:epsg": code,
         **({} if code is not None else {"proj:wkt2": grid.crs.to_wkt(version="WKT2_2019")}),

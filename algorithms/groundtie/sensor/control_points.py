@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
-from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, reproject
+from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, crs_name, reproject
 from .adjustment import Control
 from .control_formats import GDAL_FIRST, HEIGHT, read_others
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
@@ -106,13 +107,20 @@ class ControlPoints:
     def _gdal_options(self) -> str:
         """Return the used points of the fit as options of gdal_translate."""
         kept = self.take(self.points.fit)
-        lines = [f"-a_srs {self.crs.to_string()}"]
+        lines = [f"-a_srs {_word(self.crs)}"]
         px = kept.points.input_px + GDAL_FIRST
         for (col, row), (x, y), height in zip(
             px, kept.points.reference_xy, kept.height_m, strict=True
         ):
             lines.append(f"-gcp {col:.6f} {row:.6f} {x:.17g} {y:.17g} {height:.4f}")
         return "\n".join(lines) + "\n"
+
+
+def _word(crs: CRS) -> str:
+    """Return a CRS as GDAL's files of options have it."""
+    name = crs_name(crs)
+    # GDAL quotes what holds blanks or quotes, as JSON does.
+    return json.dumps(name, ensure_ascii=False) if '"' in name else name
 
 
 def read_control_points(

@@ -11,7 +11,7 @@ from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.terrain_model import LEAST_SLOPE
-from ..rasters.grid import LON_LAT, FloatArray, Grid, PointFunction, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, PointFunction, crs_name, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC, ground_lattice
@@ -191,7 +191,7 @@ def orient(
         raise NoOverlapError(f"{dem.path} covers nothing of the area of {source.path}")
     xy = reproject(np.vstack([extremes, seen]), LON_LAT, crs)
     if not np.isfinite(xy).all():
-        raise NoOverlapError(f"{source.path} lies outside of the domain of {crs.to_string()}")
+        raise NoOverlapError(f"{source.path} lies outside of the domain of {crs_name(crs)}")
     around = _AROUND * (xy.max(axis=0) - xy.min(axis=0))
 
     def exact(places: FloatArray) -> FloatArray:

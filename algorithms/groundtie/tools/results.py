@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..declaration import Output, file_lines, given_files
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, crs_name
 
 SIZE_OUTPUTS = (
     Output("WIDTH", "Width of the result in pixels", "width"),
@@ -77,7 +77,7 @@ class WrittenRaster:
 
 
 def _crs_name(grid: Grid) -> str:
-    return "no CRS" if grid.crs is None else str(grid.crs.to_string())
+    return "no CRS" if grid.crs is None else crs_name(grid.crs)
 
 
 @dataclass(frozen=True)
