@@ -140,7 +140,7 @@ class TiePointEvidence:
         The square root of the largest leverage ([Hastie2009] 3.2) of the border; of a spline, that
         of its affine part.
         """
-        places = self.input_grid.map_to_pixel(self._nominal_xy)[self.taken]
+        places = self.points.input_px[self.taken]
         if not np.isfinite(places).all():
             return math.inf
         frame = Frame.around(places)
