@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid
+from ..rasters.height_units import in_metres
 from ..rasters.reading import FloatImage, Mask, RasterSource
 from .layer import AREAS, drawn_onto
 from .ray_casting import Heights
@@ -60,7 +61,8 @@ class RasterModel:
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found in it."""
-        surface, known = sampled_onto(piece, self.raster, "bilinear", self.band)
+        stored, known = sampled_onto(piece, self.raster, "bilinear", self.band)
+        surface = in_metres(stored, self.raster, self.band or 1)
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
         ground = bare_ground(surface, known, piece.pixel_size_m)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
 from .grid import POSITION_ERROR_PX, FloatArray, PointFunction, finite
+from .height_units import in_metres
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
 
@@ -138,8 +139,9 @@ def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
 def read_heights(
     source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
 ) -> tuple[FloatImage, Mask]:
-    """Return heights and which of them are valid, as `RasterSource.read`."""
-    values, valid = source.read(window, 1, out_shape)
+    """Return heights in metres and which of them are valid, as `RasterSource.read`."""
+    stored, valid = source.read(window, 1, out_shape)
+    values = in_metres(stored, source)
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from .grid import Grid
 from .handles import read_by
+from .height_units import in_metres
 from .metadata import BandInfo
 from .reading import FloatImage, RasterSource, Window
 
@@ -73,7 +74,7 @@ def rendered(source: RasterSource, light: Light, band: int | None = None) -> Ras
     Parameters
     ----------
     source
-        Heights in metres; or what was rendered of it, which is rendered anew.
+        Heights; or what was rendered of it, which is rendered anew.
     light
         What lights it.
     band
@@ -113,7 +114,8 @@ class _Rendering:
         """
         (top, bottom), (left, right) = window.toranges()
         around = Window(int(left) - 1, int(top) - 1, int(right - left) + 2, int(bottom - top) + 2)
-        values, valid = self.heights.read(around, self.band)
+        stored, valid = self.heights.read(around, self.band)
+        values = in_metres(stored, self.heights, self.band)
         values[~valid] = np.nan
         return self.light.shade(*_slopes(values, self.heights.grid))[None]
 
