@@ -70,6 +70,12 @@ def test_a_bare_array_is_in_pixel_coordinates(tmp_path: Path) -> None:
         assert not source.grid.is_georeferenced
 
 
+def test_an_array_lies_where_its_transform_is_stated() -> None:
+    """Pixels of 1 m at the map's origin, upside down."""
+    with open_raster(Raster(image("uint8"), Affine.identity(), UTM)) as source:
+        assert source.grid.transform == Affine.identity() and source.grid.crs == UTM
+
+
 def test_reading_leaves_the_array_as_it_was() -> None:
     values = image("float32")
     before = values.copy()

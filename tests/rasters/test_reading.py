@@ -4,6 +4,7 @@ import threading
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -231,8 +232,13 @@ def test_a_truncated_file_fails_when_its_pixels_are_read(tmp_path: Path, compres
         read()
 
 
-def test_an_image_without_georeferencing_has_pixel_coordinates(tmp_path: Path) -> None:
-    source = open_raster(write_raster(tmp_path / "a.tif", IMAGE))
+@pytest.mark.parametrize("stated", [{}, {"crs": UTM}, {"crs": "EPSG:4326"}])
+def test_an_image_without_georeferencing_has_pixel_coordinates(
+    tmp_path: Path, stated: dict[str, Any]
+) -> None:
+    """A CRS alone tells of no place."""
+    source = open_raster(write_raster(tmp_path / "a.tif", IMAGE, **stated))
+    assert source.grid.crs is None
     assert source.grid.transform == PIXEL_COORDINATES
     assert not source.grid.is_georeferenced
     np.testing.assert_array_equal(source.grid.pixel_to_map([[5, 6]]), [[5, 6]])
@@ -248,8 +254,11 @@ RPCS = {
 
 
 @pytest.mark.parametrize("kind", ["RPCs", "ground control points"])
-def test_sensor_geometry_needs_orthorectification(tmp_path: Path, kind: str) -> None:
-    path = write_raster(tmp_path / "raw.tif", IMAGE)
+@pytest.mark.parametrize("stated", [{}, {"crs": "EPSG:4326"}])
+def test_sensor_geometry_needs_orthorectification(
+    tmp_path: Path, kind: str, stated: dict[str, Any]
+) -> None:
+    path = write_raster(tmp_path / "raw.tif", IMAGE, **stated)
     with rasterio.open(path, "r+") as dataset:
         if kind == "RPCs":
             dataset.update_tags(ns="RPC", **RPCS)

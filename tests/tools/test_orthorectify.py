@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,6 +90,25 @@ def test_where_no_height_is_known_there_is_no_data(files: dict[str, Path], tmp_p
     # Without a grid of its own it gets one of the whole image.
     own = groundtie.orthorectify(**part, dem_datum="ellipsoidal")
     assert abs(own.grid.width - whole.grid.width) < 60
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"crs": "EPSG:4326"},
+        {"crs": "EPSG:4326", "transform": Affine(1e-5, 1e-6, 9.0, 1e-6, -1e-5, 45.2)},
+        {"crs": UTM, "transform": Affine(0.1, 0, 499_000, 0, -0.1, 4_999_000)},
+    ],
+)
+def test_another_georeferencing_than_the_rpcs_does_not_count(
+    files: dict[str, Path], tmp_path: Path, stated: dict[str, Any]
+) -> None:
+    expected = groundtie.orthorectify(files["image"], files["output"], crs="EPSG:4326")
+    expected_utm = groundtie.orthorectify(files["image"], files["output"])
+    with rasterio.open(files["image"]) as plain:
+        also = write_raster(tmp_path / "also.tif", plain.read(), rpcs=plain.rpcs, **stated)
+    assert groundtie.orthorectify(also, tmp_path / "o.tif", crs="EPSG:4326").grid == expected.grid
+    assert groundtie.orthorectify(also, tmp_path / "o.tif").grid == expected_utm.grid
 
 
 def test_the_grid_of_a_reference_is_taken(files: dict[str, Path], tmp_path: Path) -> None:

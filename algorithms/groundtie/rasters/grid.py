@@ -161,6 +161,10 @@ class Grid:
         """Return another lattice on the map of this one."""
         return Grid(transform, self.crs, width, height, is_on_pixels=not self.is_georeferenced)
 
+    def on_own_pixels(self) -> Grid:
+        """Return these pixels as their own map, wherever they lie on another."""
+        return Grid(PIXEL_COORDINATES, None, self.width, self.height)
+
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""
         along = np.linspace(0, 1, points_per_side, endpoint=False)

@@ -119,7 +119,7 @@ def fits(value: float, dtype: np.dtype[Any]) -> bool:
 
 
 def grid_of(name: str, dataset: Any, *, allow_sensor_geometry: bool) -> Grid:
-    """Return the grid of a rasterio dataset; in pixel coordinates if it states none.
+    """Return the grid of a rasterio dataset; in pixel coordinates if it has no geotransform.
 
     Parameters
     ----------
@@ -136,10 +136,11 @@ def grid_of(name: str, dataset: Any, *, allow_sensor_geometry: bool) -> Grid:
         The image is located by RPCs or GCPs only, its pixels have no size, or its CRS is no map's.
     """
     crs, transform = stated(lambda: dataset.crs), dataset.transform
-    if crs is None and transform.is_identity:
+    if transform.is_identity:
+        # rasterio has this for none. Without one, a CRS locates nothing.
         if not allow_sensor_geometry:
             _refuse_sensor_geometry(name, dataset)
-        transform = PIXEL_COORDINATES
+        crs, transform = None, PIXEL_COORDINATES
     if not is_invertible(transform):
         raise GeoreferencingError(f"{name} has a geotransform that gives its pixels no size")
     try:

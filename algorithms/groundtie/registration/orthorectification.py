@@ -47,7 +47,9 @@ def write_orthoimage(
         The image shows nothing of the grid that was given.
     """
     if grid is None:
-        grid = registered_grid(source.grid, by.to_nominal_map, by.crs, pixel_size)
+        # Where another georeferencing than the RPCs places the image does not count.
+        pixels = source.grid.on_own_pixels()
+        grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size)
     else:
         covering_grid(grid, by.to_nominal_map(source.grid.outline()), within=True)
     dense, workers, progress = DenseOrientation(by), context.workers, context.progress

@@ -18,7 +18,7 @@ from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
 from ..geometry.tie_points import USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
-from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, crs_name, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject
 from .adjustment import Control
 from .control_formats import GDAL_FIRST, HEIGHT, read_others
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
@@ -149,8 +149,7 @@ def read_control_points(
     stored = read_others(path, image)
     if stored is None:
         # Map positions are the image's pixels, wherever the image nominally is.
-        own_pixels = replace(grid, crs=None, transform=PIXEL_COORDINATES)
-        stored = read_tie_points(path, own_pixels, (HEIGHT, CORRELATION, *SIGMA))
+        stored = read_tie_points(path, grid.on_own_pixels(), (HEIGHT, CORRELATION, *SIGMA))
     if len(stored) == 0:
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
