@@ -130,6 +130,49 @@ def test_feet_are_not_metres() -> None:
     assert grid.pixel_size_m == pytest.approx(10 * 1200 / 3937)
 
 
+@pytest.mark.parametrize("latitude", [-60.0, 0.0, 48.0])
+@pytest.mark.parametrize("lon", [9.0, 180.0])
+@pytest.mark.parametrize(
+    "text", ["EPSG:3857", "EPSG:3395", "+proj=merc +lat_ts=48 +datum=WGS84 +units=us-ft"]
+)
+def test_metres_of_mercator_maps_are_those_on_the_ground(
+    text: str, lon: float, latitude: float
+) -> None:
+    """By UTM, whose scale is 0.9996 at its central meridian; at 180° by that of zone 60, 3° off."""
+    crs = CRS.from_user_input(text)
+    zone = CRS.from_user_input(f"+proj=utm +zone={32 if lon == 9 else 60} +datum=WGS84")
+    centre = reproject(np.array([[lon, latitude]]), WGS84, crs)[0]
+    size = 10.0
+    grid = Grid(Affine(size, 0, centre[0] - 5 * size, 0, -size, centre[1] + 5 * size), crs, 10, 10)
+    across = reproject(grid.pixel_to_map([[4.5, 4.5], [5.5, 4.5], [4.5, 5.5]]), crs, zone)
+    metres = np.hypot(*(across[1:] - across[0]).T) / size
+    scale = (
+        0.9996 if lon == 9 else 0.9996 * (1 + np.deg2rad(3 * np.cos(np.deg2rad(latitude))) ** 2 / 2)
+    )
+    np.testing.assert_allclose(grid.metres_per_unit, metres / scale, rtol=1e-4)
+
+
+def test_no_unit_of_a_projection_that_keeps_lengths_is_changed() -> None:
+    for code in (32633, 3035, 31467, 3031, 2056):
+        grid = Grid(Affine(10, 0, 5e5, 0, -10, 5e6), CRS.from_epsg(code), 10, 10)
+        assert grid.metres_per_unit == (1.0, 1.0)
+
+
+def test_far_off_a_mercator_map_units_have_a_length() -> None:
+    grid = Grid(Affine(10, 0, 0, 0, -10, 1e12), CRS.from_epsg(3857), 10, 10)
+    assert min(grid.metres_per_unit) > 0
+
+
+def test_grads_are_no_degrees() -> None:
+    """400 grads are 360°: 60 grads of latitude are 54°."""
+    place = Affine(0.001, 0, 2, 0, -0.001, 60.005)
+    grads = Grid(place, CRS.from_epsg(4807), 10, 10).metres_per_unit
+    assert grads[1] == pytest.approx(0.9 * 111_195)
+    assert grads[0] == pytest.approx(0.9 * 111_195 * math.cos(math.radians(54)), rel=1e-6)
+    from_wkt = CRS.from_wkt(WGS84.to_wkt())
+    assert Grid(place, from_wkt, 10, 10).metres_per_unit[1] == 111_195
+
+
 def test_reprojecting_there_and_back() -> None:
     lonlat = np.array([[9.0, 45.0], [9.5, 46.0]])
     xy = reproject(lonlat, WGS84, UTM)

@@ -32,6 +32,15 @@ LON_LAT = CRS.from_epsg(4326)
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 
+# No unit shrinks by more than this towards a pole, whose own units have no length.
+_LEAST_SHRINK = 1e-6
+
+# The ellipsoid of WGS 84: equatorial radius, and square of the eccentricity.
+_RADIUS_M, _ECCENTRICITY2 = 6_378_137.0, 0.00669437999014
+
+# Steps over which the length of a map's units is measured.
+_STEP_M = 1000.0
+
 # Units of maps lie between millimetres and thousands of kilometres, in metres.
 _LARGEST_UNIT_M = 1e6
 
@@ -113,11 +122,15 @@ class Grid:
         """Metres per map unit along x and y at the grid's centre (1 without a CRS)."""
         if self.crs is None:
             return 1.0, 1.0
+        centre = self.pixel_to_map([self.centre_px])[0]
         if self.crs.is_geographic:
-            latitude = self.pixel_to_map([self.centre_px])[0, 1]
-            shrink = max(float(np.cos(np.deg2rad(latitude))), 1e-6)
-            return METRES_PER_DEGREE * shrink, METRES_PER_DEGREE
+            # WKT has it with 15 digits.
+            degrees = round(float(np.rad2deg(self.crs.units_factor[1])), 12)
+            shrink = max(float(np.cos(np.deg2rad(centre[1] * degrees))), _LEAST_SHRINK)
+            return METRES_PER_DEGREE * degrees * shrink, METRES_PER_DEGREE * degrees
         factor = float(self.crs.linear_units_factor[1])
+        if 'PROJECTION["Mercator' in self.crs.to_wkt():
+            return _metres_on_the_ground(centre, factor, self.crs)
         return factor, factor
 
     @cached_property
@@ -248,6 +261,29 @@ def require_map(crs: CRS | None) -> CRS | None:
         f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
         "map, or none (gdal_edit.py -a_srs)"
     )
+
+
+def _metres_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:
+    """Return the metres on the ground per unit of a map along x and y at a position.
+
+    For maps whose scale differs much from place to place; `unit_m` is that of the unit itself.
+    """
+    step = _STEP_M / unit_m
+    along = np.array([[-0.5, 0], [0.5, 0], [0, -0.5], [0, 0.5]]) * step
+    lon_lat = np.deg2rad(reproject(centre + along, crs, LON_LAT))
+    if not np.isfinite(lon_lat).all():
+        return unit_m, unit_m
+    latitude = lon_lat[2:, 1].mean()
+    # Radii of curvature: of the prime vertical, and of the meridian
+    bent = 1 - _ECCENTRICITY2 * np.sin(latitude) ** 2
+    across_m = _RADIUS_M / np.sqrt(bent) * np.cos(latitude)
+    along_m = _RADIUS_M * (1 - _ECCENTRICITY2) / bent**1.5
+    # West of the antimeridian is -180°.
+    turn = np.remainder(lon_lat[1, 0] - lon_lat[0, 0] + np.pi, 2 * np.pi) - np.pi
+    rise = lon_lat[3, 1] - lon_lat[2, 1]
+    x, y = np.abs([turn * across_m, rise * along_m]) / step
+    least = _LEAST_SHRINK * unit_m
+    return max(float(x), least), max(float(y), least)
 
 
 def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> tuple[float, float]:
