@@ -65,6 +65,14 @@ def test_positions_come_in_arrays_of_any_shape(kind: str) -> None:
         assert function(positions[:0]).shape == (0, 5, 2)
 
 
+def test_an_input_across_the_antimeridian_is_one() -> None:
+    """Longitudes from 179.99° to 180.01°; beyond 180° PROJ has -180°."""
+    grid = Grid(Affine(1e-5, 0, 179.99, 0, -1e-5, -17.0), CRS.from_epsg(4326), 2000, 400)
+    transform = Transform.nominal(CRS.from_epsg(32701), grid)
+    px = grid.lattice()
+    np.testing.assert_allclose(transform(transform.inverse(px)), px, atol=1e-3)
+
+
 def test_nominal_is_the_georeferencing() -> None:
     transform = Transform.nominal(UTM, DEGREES)
     px = np.array([[0.0, 0.0], [399.0, 299.0]])

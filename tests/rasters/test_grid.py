@@ -173,6 +173,38 @@ def test_grads_are_no_degrees() -> None:
     assert Grid(place, from_wkt, 10, 10).metres_per_unit[1] == 111_195
 
 
+class TestAcrossTheAntimeridian:
+    """A grid from 179.99° to 180.01°, of which PROJ has the east as -180° to -179.99°."""
+
+    GRID = Grid(Affine(1e-5, 0, 179.99, 0, -1e-5, -17.0), WGS84, 2000, 400)
+    UTM60 = CRS.from_epsg(32760)
+    ZONE = Grid(Affine(10, 0, 818_000, 0, -10, 8_118_000), UTM60, 100, 100)
+
+    @pytest.mark.parametrize("turn", [0.0, -360.0])
+    def test_longitudes_go_on_as_the_grids_do(self, turn: float) -> None:
+        grid = self.GRID.shifted(turn, 0)
+        px = grid.lattice()
+        xy = reproject(grid.pixel_to_map(px), WGS84, self.UTM60)
+        np.testing.assert_allclose(self.ZONE.to_pixels_of(grid)(xy), px, atol=1e-3)
+
+    def test_between_maps_of_other_longitudes(self) -> None:
+        west = self.GRID.shifted(-360.0, 0)
+        px = west.lattice()
+        found = west.to_pixels_of(self.GRID)(west.pixel_to_map(px))
+        np.testing.assert_allclose(found, px, atol=1e-4)
+
+    def test_what_has_no_longitude_stays_infinite(self) -> None:
+        xy = np.array([[np.inf, np.inf], [np.nan, np.nan], [179.995, -17.001]])
+        found = self.GRID.to_own_map(xy, WGS84)
+        np.testing.assert_array_equal(found, xy)
+
+    @pytest.mark.parametrize("left", [-180.0, 0.0])
+    def test_a_grid_of_the_whole_earth_is_as_its_crs_has_it(self, left: float) -> None:
+        grid = Grid(Affine(1, 0, left, 0, -1, 90), WGS84, 360, 180)
+        xy = np.array([[-179.9, 1.0], [-0.1, 2.0], [0.1, 3.0], [359.9, 4.0]])
+        np.testing.assert_array_equal(grid.to_own_map(xy, WGS84), xy)
+
+
 def test_reprojecting_there_and_back() -> None:
     lonlat = np.array([[9.0, 45.0], [9.5, 46.0]])
     xy = reproject(lonlat, WGS84, UTM)

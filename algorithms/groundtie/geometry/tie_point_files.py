@@ -240,7 +240,7 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     names = set().union(*rows)
     px = np.full((len(rows), 2), np.nan)
     if input_grid.is_georeferenced and NOMINAL[0] in names:
-        px = input_grid.map_to_pixel(reproject(columns(rows, *NOMINAL), crs, input_grid.crs))
+        px = input_grid.map_to_pixel(input_grid.to_own_map(columns(rows, *NOMINAL), crs))
     if INPUT[0] in names:
         on_map = input_grid.map_to_pixel(columns(rows, *INPUT))
         px = np.where(np.isfinite(px), px, on_map)

@@ -62,7 +62,7 @@ class Transform:
         """Return the input pixels (col, row), centres at integers, of map positions (..., 2)."""
         positions = np.asarray(xy, float)
         moved = self.model(positions.reshape(-1, 2))
-        nominal = reproject(moved, self.crs, self.input_grid.crs)
+        nominal = self.input_grid.to_own_map(moved, self.crs)
         return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
 
     def of_map(self, crs: CRS | None) -> PointFunction:

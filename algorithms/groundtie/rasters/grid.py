@@ -92,7 +92,18 @@ class Grid:
 
     def to_pixels_of(self, other: Grid) -> PointFunction:
         """Return the function from map positions, as this grid has them, to another's pixels."""
-        return lambda xy: other.map_to_pixel(reproject(xy, self.crs, other.crs))
+        return lambda xy: other.map_to_pixel(other.to_own_map(xy, self.crs))
+
+    def to_own_map(self, xy: FloatArray, crs: CRS | None) -> FloatArray:
+        """Return positions of another CRS, shape (n, 2), on this grid's map, as `reproject`.
+
+        Where the grid lies across the antimeridian, longitudes go on beyond it as the grid's do.
+        """
+        moved = reproject(xy, crs, self.crs)
+        if self._turn is None:
+            return moved
+        turns = np.rint((moved[:, :1] - self.pixel_to_map([self.centre_px])[0, 0]) / self._turn)
+        return moved - np.nan_to_num(turns, posinf=0, neginf=0) * [self._turn, 0]
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -124,14 +135,24 @@ class Grid:
             return 1.0, 1.0
         centre = self.pixel_to_map([self.centre_px])[0]
         if self.crs.is_geographic:
-            # WKT has it with 15 digits.
-            degrees = round(float(np.rad2deg(self.crs.units_factor[1])), 12)
+            degrees = _degrees_per_unit(self.crs)
             shrink = max(float(np.cos(np.deg2rad(centre[1] * degrees))), _LEAST_SHRINK)
             return METRES_PER_DEGREE * degrees * shrink, METRES_PER_DEGREE * degrees
         factor = float(self.crs.linear_units_factor[1])
         if 'PROJECTION["Mercator' in self.crs.to_wkt():
             return _metres_on_the_ground(centre, factor, self.crs)
         return factor, factor
+
+    @cached_property
+    def _turn(self) -> float | None:
+        """A full turn of longitude in map units, if the grid lies across the antimeridian."""
+        if self.crs is None or not self.crs.is_geographic:
+            return None
+        turn = 360 / _degrees_per_unit(self.crs)
+        longitudes = apply_affine(self.centre_transform, self.outline(1))[:, 0]
+        # Of the whole Earth there is no other side that positions could be taken for.
+        is_across = np.abs(longitudes).max() > turn / 2 and np.ptp(longitudes) < turn / 2
+        return turn if is_across else None
 
     @cached_property
     def pixel_size_m(self) -> float:
@@ -261,6 +282,12 @@ def require_map(crs: CRS | None) -> CRS | None:
         f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
         "map, or none (gdal_edit.py -a_srs)"
     )
+
+
+def _degrees_per_unit(crs: CRS) -> float:
+    """Return the unit of a geographic CRS in degrees."""
+    # WKT has it with 15 digits.
+    return round(float(np.rad2deg(crs.units_factor[1])), 12)
 
 
 def _metres_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:

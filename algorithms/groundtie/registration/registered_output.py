@@ -100,7 +100,7 @@ def resampled_onto(
     crs = source.grid.crs
 
     def px_to_own_map(px: FloatArray) -> FloatArray:
-        return reproject(transform.inverse(px), transform.crs, crs)
+        return source.grid.to_own_map(transform.inverse(px), transform.crs)
 
     return transform.of_map(crs), registered_grid(source.grid, px_to_own_map, crs)
 
@@ -135,7 +135,7 @@ def moved_grid(transform: Transform) -> Grid:
     """
     grid = transform.input_grid
     px = grid.outline(3)
-    xy = reproject(transform.inverse(px), transform.crs, grid.crs)
+    xy = grid.to_own_map(transform.inverse(px), transform.crs)
     shifts = xy - grid.pixel_to_map(px)
     dx, dy = shifts.mean(axis=0)
     if np.abs(shifts - [dx, dy]).max() > UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):

@@ -14,7 +14,7 @@ from ..errors import (
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
-from ..rasters.grid import FloatArray, Grid, reproject, require_both_or_none
+from ..rasters.grid import FloatArray, Grid, require_both_or_none
 from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
 from .verdict import decide
@@ -87,9 +87,7 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
         )
     if own.is_georeferenced and registered.is_georeferenced:
         require_both_or_none(own.crs, registered.crs, f"{source.path} and {name}")
-        seen = registered.map_to_pixel(
-            reproject(own.pixel_to_map(own.outline()), own.crs, registered.crs)
-        )
+        seen = own.to_pixels_of(registered)(own.pixel_to_map(own.outline()))
         if not _boxes_meet(seen, registered):
             raise NoOverlapError(f"{source.path} does not lie where {name} was made for")
         return Transform(found.model, found.crs, own)

@@ -150,6 +150,5 @@ def sigma_px(covariance: FloatArray) -> float:
 
 def _box(grid: Grid, date: Grid) -> FloatArray:
     """Return the corners of a date's bounding box in pixels of a grid, shape (2, 2)."""
-    xy = reproject(date.pixel_to_map(date.outline()), date.crs, grid.crs)
-    px = grid.map_to_pixel(xy)
+    px = date.to_pixels_of(grid)(date.pixel_to_map(date.outline()))
     return np.array([px.min(axis=0), px.max(axis=0)])

@@ -120,6 +120,6 @@ def _target_grid(found: Transform, reference: Path | None, pixel_size: float | N
     with open_raster(reference) as source:
         grid = source.grid
     require_both_or_none(grid.crs, found.crs, f"{reference} and the transform")
-    footprint = reproject(found.inverse(found.input_grid.outline()), found.crs, grid.crs)
+    footprint = grid.to_own_map(found.inverse(found.input_grid.outline()), found.crs)
     covering_grid(grid, footprint, within=True)
     return grid
