@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from raster_files import write_raster
+from affine import Affine
+from raster_files import UTM, write_raster
 from textured_pairs import TexturedPair, shift_on_map, write_textured_pair
 
 from groundtie.context import threads
@@ -19,7 +20,10 @@ from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.held_out import HeldOut
 from groundtie.matching.pyramid import find_coarse_model
 from groundtie.matching.surface_fit import SurfaceFit
-from groundtie.rasters.pair import ImagePair
+from groundtie.pose.rotation_windows import read_windows
+from groundtie.rasters.grid import Grid, compose, mesh
+from groundtie.rasters.pair import Image, ImagePair, make_pair
+from groundtie.rasters.reading import open_raster
 from groundtie.similarity.surface import SimilaritySettings
 
 
@@ -107,3 +111,42 @@ def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
         blocks = layout.columns.cells * layout.rows.cells
         side = layout.columns.block / factor + 7
         assert mask.sum() <= blocks * side**2
+
+
+@pytest.mark.parametrize("rotation_deg", [5.0, 45.0, 90.0])
+@pytest.mark.parametrize("pixel_m", [10.0, 23.0])
+def test_poses_are_searched_for_without_what_is_held_out_of_a_rotated_reference(
+    tmp_path: Path, rotation_deg: float, pixel_m: float
+) -> None:
+    """Windows of poses are north up; noise where the reference is held out changes none."""
+    side = 400
+    centre = Affine.translation(500_000, 5_000_000)
+    turned = compose(centre, Affine.rotation(rotation_deg), Affine.translation(-2000, 2000))
+    grid = Grid(compose(turned, Affine.scale(10, -10)), UTM, side, side)
+    count = round(10 * side / pixel_m)
+    other = Grid(compose(turned, Affine.scale(pixel_m, -pixel_m)), UTM, count, count)
+    random = np.random.default_rng(0)
+    values = random.integers(1, 1000, (side, side), dtype=np.uint16)
+    input = write_raster(tmp_path / "input.tif", values[:count, :count], other)
+    original = write_raster(tmp_path / "original.tif", values, grid)
+    with open_raster(original) as reference, open_raster(input) as source:
+        images = Image(reference), Image(source)
+        pair = make_pair(*images, rotation_deg=5.0)
+        held_out = HeldOut.of(pair)
+        cols, rows = (np.arange(float(side)) for _ in range(2))
+        px = pair.grid.map_to_pixel(grid.pixel_to_map(mesh(cols, rows)))
+        layout = held_out.layout
+        hidden = layout.columns.held_out(px[:, 0]) & layout.rows.held_out(px[:, 1])
+        whole = read_windows(*images, (1.0, 1.0)).reference.valid
+        windows = read_windows(*images, (1.0, 1.0), held_out=held_out)
+        seen = windows.reference
+    hidden = hidden.reshape(side, side)
+    assert 0.15 < hidden.mean() < 0.4
+    noise = random.integers(1, 60_000, (side, side), dtype=np.uint16)
+    spoiled = write_raster(tmp_path / "spoiled.tif", np.where(hidden, noise, values), grid)
+    with open_raster(spoiled) as reference, open_raster(input) as source:
+        misled = read_windows(Image(reference), Image(source), (1.0, 1.0), held_out=held_out)
+    np.testing.assert_array_equal(misled.reference.valid, seen.valid)
+    np.testing.assert_array_equal(misled.reference.values[seen.valid], seen.values[seen.valid])
+    # More is left than the narrow lines between all that may see a block.
+    assert seen.valid.sum() > 0.3 * whole.sum()

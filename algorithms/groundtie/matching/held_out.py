@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.grid import Grid
+from ..rasters.grid import POSITION_ERROR_PX, FloatArray, Grid, compose, mesh
 from ..rasters.kernels import REACH
 from ..rasters.pair import ImagePair
 from .layout import ChipLayout, lay_out_chips
@@ -41,25 +41,35 @@ class HeldOut:
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a grid, of any pixel size, see a part of held-out blocks, (h, w).
 
-        The grid is a part of the matching grid's own lattice or of a coarser one along its axes.
+        Mostly it is a part of the matching grid's own lattice or of a coarser one along its axes,
+        of which whole columns and rows are asked for; pixels of others are asked for one by one.
         """
-        cols = np.arange(piece.width, dtype=float)
-        rows = np.arange(piece.height, dtype=float)
-        along_cols = piece.pixel_to_map(np.column_stack([cols, np.zeros_like(cols)]))
-        along_rows = piece.pixel_to_map(np.column_stack([np.zeros_like(rows), rows]))
-        return self.layout.held_out_mask(
-            self.grid.map_to_pixel(along_cols)[:, 0],
-            self.grid.map_to_pixel(along_rows)[:, 1],
-            self._reach_px(piece),
-        )
+        cols, rows = np.arange(piece.width, dtype=float), np.arange(piece.height, dtype=float)
+        reach = self._reach_px(piece)
+        if not self._has_axes_of(piece):
+            px = self._matching_px(piece, mesh(cols, rows))
+            return self.layout.is_held_out(px, reach).reshape(piece.height, piece.width)
+        along_cols = self._matching_px(piece, np.column_stack([cols, np.zeros_like(cols)]))
+        along_rows = self._matching_px(piece, np.column_stack([np.zeros_like(rows), rows]))
+        return self.layout.held_out_mask(along_cols[:, 0], along_rows[:, 1], reach)
+
+    def _matching_px(self, piece: Grid, px: FloatArray) -> FloatArray:
+        return self.grid.map_to_pixel(piece.pixel_to_map(px))
+
+    def _has_axes_of(self, piece: Grid) -> bool:
+        """Return whether columns and rows of a piece lie along those of the matching grid."""
+        across = compose(~self.grid.transform, piece.transform)
+        off_px = max(abs(across.d) * piece.width, abs(across.b) * piece.height)
+        return bool(off_px < POSITION_ERROR_PX)
 
     def _reach_px(self, piece: Grid) -> float:
         """Return how far off a piece's pixel sees of the reference, in matching pixels."""
         size, matching, piece_size = (
             grid.pixel_size[0] for grid in (self.reference_grid, self.grid, piece)
         )
-        if np.allclose([matching / size, piece_size / size], 1.0):
+        if np.allclose([matching / size, piece_size / size], 1.0) and self._has_axes_of(piece):
             return 0.0  # the reference's own pixels
-        # Larger pixels are interpolated between means of the reference's: see `warping.sample`.
+        # Others are interpolated between the reference's, larger ones between means of these, along
+        # the reference's axes: see `warping.sample`.
         averaged = max(round(piece_size / size), 1)
         return (REACH["cubic"] + 0.5) * averaged * size / matching
