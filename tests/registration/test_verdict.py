@@ -104,6 +104,16 @@ def test_a_bias_within_the_tolerance_counts_as_error() -> None:
     assert judged(check, max_error=3.0).accepted
 
 
+def test_what_is_measured_does_not_depend_on_the_largest_error() -> None:
+    """Exact matches, and others that agree within 2 px: a small limit makes no outliers of them."""
+    check = check_points(np.concatenate([scatter(42, 0.06), scatter(30, 0.9, seed=9)]))
+    refused, usual = judged(check, max_error=0.2), judged(check, max_error=3.0)
+    assert usual.accepted
+    assert refused.rule == "error at held-out points"
+    assert refused.check_rmse_px == usual.check_rmse_px > 0.5
+    assert refused.accuracy == usual.accuracy
+
+
 def test_points_in_one_corner_do_not_hold_the_rest() -> None:
     estimate = estimated(fit_points(within=(0.15, 0.15), sigma=0.5), "polynomial2")
     verdict = judged(check_points(scatter(72, 0.3)), estimate)

@@ -44,7 +44,7 @@ def sigma_range_px(max_error_px: float) -> tuple[float, float]:
     """Return the standard deviations that held-out inliers may turn out to have, in pixels.
 
     The larger one is so many times what the largest error allows that errors above it are still
-    seen.
+    seen; and no less than usual, as how large errors are does not depend on what is asked for.
     """
-    largest = _SIGMA_BEYOND * max_error_px / math.sqrt(2)
-    return _SMALLEST_SIGMA_PX, max(largest, _SMALLEST_SIGMA_PX)
+    largest = _SIGMA_BEYOND * max(max_error_px, USUAL_MAX_ERROR_PX) / math.sqrt(2)
+    return _SMALLEST_SIGMA_PX, largest
