@@ -78,6 +78,40 @@ def test_a_refused_registration_writes_its_report_and_raises(
     registration.require_accepted()
 
 
+@pytest.mark.parametrize(
+    ("name", "grid", "is_stated"),
+    [
+        ("o.tif", "reference", False),
+        ("o.tif", "input", True),
+        ("o.tif", "untouched", True),
+        ("o.vrt", "reference", True),
+    ],
+)
+def test_what_is_written_beyond_the_overlap_is_stated(
+    registration: Registration,
+    tmp_path: Path,
+    context: Context,
+    name: str,
+    grid: str,
+    is_stated: bool,
+) -> None:
+    """Of the matching grid, the left half is taken for all that the images share."""
+    evidence = registration.evidence
+    assert evidence is not None
+    half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)
+    wide = replace(registration, evidence=replace(evidence, grid=half))
+    files = RegistrationFiles(RegisteredOutput(tmp_path / name, grid), report=tmp_path / "r.html")
+    found = Call("", "", files).deliver(wide, context, ExitStack())
+    (line,) = [line for line in found.lines() if "outside of the overlap" in line] or [""]
+    assert ("of the registered image" in line) == is_stated
+    assert ("outside of the overlap" in (tmp_path / "r.html").read_text()) == is_stated
+    numbers = json.loads((tmp_path / "r.json").read_text())
+    assert ("outside_of_overlap" in numbers) == is_stated
+    assert ("outside_of_overlap" in found.summary()) == is_stated
+    if is_stated:
+        assert numbers["outside_of_overlap"]["share"] == pytest.approx(0.5, abs=0.1)
+
+
 def test_what_fails_later_leaves_no_report_either(
     registration: Registration, tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:

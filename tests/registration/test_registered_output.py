@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.registered_output import (
     OUTPUT_GRIDS,
+    BeyondOverlap,
     RegisteredOutput,
     model_for_grid,
     moved_grid,
@@ -128,3 +130,35 @@ def test_a_reference_grid_in_another_crs_than_the_transform_shows_the_same_groun
         output.write(source, target, Transform.nominal(UTM, GRID), outputs, one_thread)
     # Waves of sixty pixels: GDAL's approximation of positions costs an eighth of one.
     np.testing.assert_allclose(pixels(output.path)[0], expected, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("overlap", "share"),
+    [
+        (GRID.window(-50, -50, 400, 400), 0.0),
+        (GRID.window(4, 3, 100, 75), 0.75),
+        (GRID.window(4 + 150, 3, 100, 150), 0.75),  # ends 50 px beyond the input
+        (GRID.window(900, 0, 100, 100), 1.0),
+    ],
+)
+def test_what_lies_outside_of_the_overlap(overlap: Grid, share: float) -> None:
+    """The input is moved by 4 px to the right and 3 px down, to its place."""
+    transform = Transform(shift_on_map(-40.0, 30.0), UTM, GRID)
+    beyond = BeyondOverlap.of(transform, overlap)
+    assert beyond.share == pytest.approx(share, abs=0.02)
+    assert not beyond.bends
+    assert "warning" not in beyond.line()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_models_that_bend_are_warned_of(kind: str) -> None:
+    beyond = BeyondOverlap(0.78, kind)
+    assert "78 % of the registered image" in beyond.line().replace("%", " %")
+    bends = kind in ("polynomial2", "polynomial3", "tps")
+    assert beyond.summary() == {"share": 0.78, "model_bends": bends}
+    assert (f"warning: {kind} bends" in beyond.line()) == bends
+
+
+def test_positions_that_nothing_leads_to_lie_outside() -> None:
+    transform = Transform(shift_on_map(math.nan, 0.0), UTM, GRID)
+    assert BeyondOverlap.of(transform, GRID).share == 1

@@ -21,9 +21,12 @@ from .asked import USUAL, asked_masks, specified
 from .displacement import write_displacement
 from .opening import OpenPair, open_pair, pair_images
 from .pipeline import run
-from .registered_output import RegisteredOutput
+from .registered_output import REFERENCE_GRID, BeyondOverlap, RegisteredOutput, grid_of_output
 from .registration import Registration
 from .specification import Specification
+
+# Less than this share outside of the overlap is not worth a line: it would be 0 %.
+_LEAST_BEYOND = 0.005
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,16 @@ class RegistrationFiles:
         }
         named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
+
+    def beyond(self, registration: Registration) -> BeyondOverlap | None:
+        """Return what of the written image lies outside of the overlap; None: nothing, or none."""
+        output, evidence = self.output, registration.evidence
+        if output is None or evidence is None or not registration.verdict.accepted:
+            return None
+        if grid_of_output(output.path, output.grid) == REFERENCE_GRID:
+            return None
+        found = BeyondOverlap.of(registration.accepted(), evidence.grid)
+        return found if found.share >= _LEAST_BEYOND else None
 
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""
@@ -191,6 +204,7 @@ class Call:
             It was refused; its report is written.
         """
         with stack:
+            registration = replace(registration, beyond=self.files.beyond(registration))
             # Not for as long as the rasters: environments must be left in the order of entering.
             with bounded_cache():
                 self.files.write(registration, context)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,14 @@ from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.vrt import write_vrt
 
-UNTOUCHED = "untouched"
-OUTPUT_GRIDS = ("reference", "input", UNTOUCHED)
+REFERENCE_GRID, UNTOUCHED = "reference", "untouched"
+OUTPUT_GRIDS = (REFERENCE_GRID, "input", UNTOUCHED)
+
+# Models that bend ever more where no point holds them.
+_BENDING = ("polynomial2", "polynomial3", "tps")
+
+# Places a side of a raster at which its share in the overlap is found.
+_PLACES = 101
 
 # Pixels keep their places when only the geotransform changes, but for this error, in pixels.
 UNTOUCHED_TOLERANCE_PX = 0.05
@@ -83,6 +90,48 @@ class RegisteredOutput:
         return target
 
 
+@dataclass(frozen=True)
+class BeyondOverlap:
+    """What of an image, registered as a whole, lies where nothing has checked its transform.
+
+    Parameters
+    ----------
+    share
+        Share of its pixels outside of the overlap.
+    model
+        The kind of the transform's model.
+    """
+
+    share: float
+    model: str
+
+    @classmethod
+    def of(cls, transform: Transform, overlap: Grid) -> BeyondOverlap:
+        """Return what of a transform's raster lies beyond a grid on the reference's map."""
+        xy = transform.inverse(transform.input_grid.lattice(_PLACES))
+        inside = overlap.contains(overlap.map_to_pixel(xy))
+        return cls(1 - float(inside.mean()), transform.model.kind)
+
+    @property
+    def bends(self) -> bool:
+        """Whether the model is not known beyond its points: one that bends."""
+        return self.model in _BENDING
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as values that JSON can carry."""
+        return {"share": self.share, "model_bends": self.bends}
+
+    def line(self) -> str:
+        """Return it as a line of text."""
+        line = (
+            f"outside of the overlap: {self.share:.0%} of the registered image, where nothing has "
+            "checked the transform"
+        )
+        if not self.bends:
+            return line
+        return f"{line}; warning: {self.model} bends, and may be off there by any amount"
+
+
 def resampled_onto(
     grid: str, source: RasterSource, reference: Grid, transform: Transform
 ) -> tuple[PointFunction, Grid]:
@@ -95,7 +144,7 @@ def resampled_onto(
     source, reference, transform
         As `RegisteredOutput.write` takes them.
     """
-    if grid == "reference":
+    if grid == REFERENCE_GRID:
         return transform.of_map(reference.crs), reference
     crs = source.grid.crs
 

@@ -29,7 +29,7 @@ from ..report.details import extremes
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
-from .registered_output import RegisteredOutput, resampled_onto
+from .registered_output import BeyondOverlap, RegisteredOutput, resampled_onto
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
@@ -69,6 +69,8 @@ class Registration:
         What was written, by name.
     tried
         What was tried before, a line each.
+    beyond
+        What of the written image lies outside of the overlap; None: nothing.
     rasters
         Closes the images and masks.
     """
@@ -84,6 +86,7 @@ class Registration:
     started: float = 0.0
     files: Mapping[str, Path] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
+    beyond: BeyondOverlap | None = None
     rasters: ExitStack = field(default_factory=ExitStack, repr=False, compare=False)
 
     @property
@@ -184,6 +187,7 @@ class Registration:
             survey=None if self.evidence is None else self.evidence.surveys.whole,
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
+            beyond=self.beyond,
         )
 
     def extreme_surfaces(self) -> tuple[tuple[str, Surface], ...]:
@@ -221,6 +225,8 @@ class Registration:
             ]
             if self.mask.image is not None:
                 lines.append(self.mask.line())
+            if self.beyond is not None:
+                lines.append(self.beyond.line())
         return lines + file_lines(self.files)
 
     def close(self) -> None:

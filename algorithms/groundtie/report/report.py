@@ -13,6 +13,7 @@ from ..geometry.transform import Transform
 from ..masks.used import MaskUsed
 from ..matching.survey import Survey
 from ..rasters.pair import ImagePair
+from ..registration.registered_output import BeyondOverlap
 from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
@@ -43,6 +44,8 @@ class Report(Page):
         Facts about the images by their names.
     survey
         What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
+    beyond
+        What of the written image lies outside of the overlap; None: nothing.
     """
 
     verdict: Verdict
@@ -53,11 +56,12 @@ class Report(Page):
     mask: MaskUsed
     scene: Mapping[str, Any]
     survey: Survey | None
+    beyond: BeyondOverlap | None = None
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
-        moved = self.correction()
+        moved, beyond = self.correction(), self.beyond
         return {
             "verdict": self.verdict.summary(),
             "correction": None if moved is None else moved.summary(),
@@ -65,6 +69,7 @@ class Report(Page):
             "mask": self.mask.summary(),
             "scene": dict(self.scene),
             **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
+            **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
         }
 
     def correction(self) -> Correction | None:
@@ -74,10 +79,11 @@ class Report(Page):
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
         found, grid = self.transform, self.pair.grid
+        beyond = () if self.beyond is None else (self.beyond.line(),)
         return {
             "verdict": self.verdict,
             "grid": grid,
-            "notes": [*self.pair.notes(), self.mask.line()],
+            "notes": [*self.pair.notes(), self.mask.line(), *beyond],
             "metres": grid.metres_per_pixel,
             "model": None if found is None else found.model.kind,
             "correction": self.correction(),

@@ -580,8 +580,8 @@
       <translation>Grauwerte</translation>
     </message>
     <message>
-      <source>Grid of the registered image: the reference's pixels exactly, so that both stack; pixels like the input's own; or, for a pure shift, the input's untouched pixels with a corrected geotransform.</source>
-      <translation>Gitter des registrierten Bildes: genau die Pixel der Referenz, so dass beide aufeinanderliegen; Pixel wie die der Eingabe; oder, bei reiner Verschiebung, die unberührten Pixel der Eingabe mit korrigierter Georeferenz.</translation>
+      <source>Grid of the registered image: the reference's pixels exactly, so that both stack; pixels like the input's own; or, for a pure shift, the input's untouched pixels with a corrected geotransform. The last two reach beyond the overlap, where nothing has checked the transform.</source>
+      <translation>Gitter des registrierten Bildes: genau die Pixel der Referenz, so dass beide aufeinanderliegen; Pixel wie die der Eingabe; oder, bei reiner Verschiebung, die unberührten Pixel der Eingabe mit korrigierter Georeferenz. Die beiden letzten reichen über die Überlappung hinaus, wo nichts die Transformation geprüft hat.</translation>
     </message>
     <message>
       <source>Ground control points</source>

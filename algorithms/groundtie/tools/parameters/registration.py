@@ -163,7 +163,8 @@ OutputGrid = Annotated[
         label="Output grid",
         help="Grid of the registered image: the reference's pixels exactly, so that both "
         "stack; pixels like the input's own; or, for a pure shift, the input's untouched "
-        "pixels with a corrected geotransform.",
+        "pixels with a corrected geotransform. The last two reach beyond the overlap, where "
+        "nothing has checked the transform.",
         choices=OUTPUT_GRIDS,
         advanced=True,
     ),
