@@ -120,6 +120,17 @@ class TestFiles:
         assert [len(part) for part in measure_tie_points(path, self.transform)] == [1, 1]
         assert measure_check_points(path, self.transform).position_px.tolist() == [[2, 2]]
 
+    @pytest.mark.parametrize("held_out", ["", "500205,4999795,2,2,check,rejected: blurred\n"])
+    def test_points_of_a_fit_are_no_check_points(self, tmp_path: Path, held_out: str) -> None:
+        """Nor are points that a person drew beside them: a model is fitted to these, too."""
+        path = self.written(
+            tmp_path / "p.csv",
+            "reference_x,reference_y,input_col,input_row,role,state\n"
+            "500105,4999895,1,1,fit,used\n500305,4999695,3,3,,\n" + held_out,
+        )
+        with pytest.raises(TooFewPointsError, match=r"p\.csv: no points took no part in the fit"):
+            measure_check_points(path, self.transform)
+
     def test_a_byte_order_mark_and_quotes(self, tmp_path: Path) -> None:
         path = self.written(
             tmp_path / "p.csv",

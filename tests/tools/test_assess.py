@@ -33,6 +33,7 @@ from groundtie.errors import (
     NotRegisteredError,
     TooFewPointsError,
 )
+from groundtie.geometry.tie_point_files import read_tie_points, write_tie_points
 from groundtie.geometry.transform import Transform
 from groundtie.kinds import REPORT_FORMAT
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
@@ -191,6 +192,19 @@ class TestVerdict:
         assert assess(files.path("t.json"), fitted).assessment.control_points.in_pixels.rmse < 1e-6
         with pytest.raises(TooFewPointsError, match="no points took no part in the fit"):
             assess(files.path("t.json"), fitted, max_error=3.0)
+
+    def test_points_without_roles_do_not_check_their_own_fit(self, files: Files) -> None:
+        """Files of the Georeferencer have no roles; other ones need none."""
+        fitted = files.path("fit.points")
+        transform = load_transform(files.path("t.json"))
+        points = read_tie_points(files.path("points.gpkg"), INPUT)
+        write_tie_points(fitted, points, transform)
+        for path in (fitted, files.path("check.csv")):
+            same = path.parent / ".." / "in" / path.name
+            with pytest.raises(TooFewPointsError, match="no points took no part in the fit"):
+                assess(files.path("t.json"), path, same)
+        found = assess(files.path("t.json"), check_points=fitted).assessment.check_points
+        assert len(found) == 20
 
 
 class TestReport:

@@ -126,6 +126,13 @@ def test_points_that_the_rpcs_cannot_place_are_counted(
     assert not (tmp_path / "a.csv").exists()
 
 
+def test_points_of_a_fit_are_no_check_points(files: dict[str, Path]) -> None:
+    lines = files["check_points"].read_text().splitlines()
+    files["check_points"].write_text("\n".join([lines[0], lines[-1]]))
+    with pytest.raises(TooFewPointsError, match=r"points\.csv: no points took no part in the fit"):
+        groundtie.assess_sensor(**files, height=300.0)
+
+
 def test_refined_rpcs_must_be_there(files: dict[str, Path], tmp_path: Path) -> None:
     with pytest.raises(GroundTieError, match="cannot read the RPCs"):
         groundtie.assess_sensor(**files, refined=tmp_path / "none.txt", height=300.0)

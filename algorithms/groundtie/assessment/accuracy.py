@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from ..errors import TooFewPointsError
+from ..geometry.tie_points import NONE_HELD_OUT
 from ..registration.evidence import AGREEMENT, ASSESSMENT, ERROR, Agreement
 from ..registration.verdict import Verdict, decide
 from .point_errors import PointErrors
@@ -99,10 +100,7 @@ class Assessment:
         if not len(judged):
             name, judged = "test points", self.test_points
         if not len(judged):
-            raise TooFewPointsError(
-                "no points took no part in the fit: give check points, or tie points with the "
-                "role check"
-            )
+            raise TooFewPointsError(NONE_HELD_OUT)
         px, metres = judged.in_pixels, judged.in_metres
         ways = {"two-way": self.two_way, "three-way": self.three_way}
         misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}

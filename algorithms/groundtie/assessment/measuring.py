@@ -17,7 +17,7 @@ from ..errors import (
     TransformFileError,
 )
 from ..geometry.tie_point_files import read_tie_points
-from ..geometry.tie_points import TiePoints
+from ..geometry.tie_points import NONE_HELD_OUT, TiePoints
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import reproject, require_both_or_none
 from ..rasters.reading import RasterSource
@@ -92,7 +92,7 @@ class AssessmentFiles:
             measured = measure_tie_points(self.tie_points, found, max_error_px)
             parts["control_points"], parts["test_points"] = measured
         if self.check_points is not None:
-            parts["check_points"] = measure_check_points(self.check_points, found)
+            parts["check_points"] = measure_check_points(self.check_points, found, self.tie_points)
         subject = Leg(str(self.transform or self.tie_points), found)
         if self.back_transform is not None:
             parts["two_way"] = consistency(subject, [_leg(self.back_transform)])
@@ -120,14 +120,27 @@ def measure_tie_points(
     return control, test.of_inliers(max_error_px)
 
 
-def measure_check_points(path: Path, transform: Transform) -> PointErrors:
-    """Measure a transform at independent points; raises as `read_points`.
+def measure_check_points(
+    path: Path, transform: Transform, tie_points: Path | None = None
+) -> PointErrors:
+    """Measure a transform at independent points.
 
-    Where some points have the role "check", those without it do not take part.
+    Where some points have a role, those without the role "check" do not take part; nor do they in
+    the file of the registration's `tie_points`.
+
+    Raises
+    ------
+    TooFewPointsError
+        All points took part in the fit.
+    TransformFileError, GeoreferencingError
+        As `read_points`, which raises TooFewPointsError, too.
     """
     points = read_points(path, transform)
-    which = points.check
-    return _errors(transform, points, which if which.any() else points.used)
+    is_of_the_fit = tie_points is not None and tie_points.resolve() == path.resolve()
+    which = points.check if is_of_the_fit else points.independent
+    if not which.any():
+        raise TooFewPointsError(f"{path}: {NONE_HELD_OUT}")
+    return _errors(transform, points, which)
 
 
 def read_points(path: Path, transform: Transform) -> TiePoints:

@@ -218,6 +218,7 @@ def _from_rows(
     """Return the points of a table."""
     # A drawn line has empty columns.
     states = [str(row.get("state") or USED) for row in rows]
+    roles = [row.get("role") for row in rows]
     sigma = columns(rows, *SIGMA)
     points = TiePoints.unmeasured(
         require_places(positions(rows, *REFERENCE)),
@@ -230,8 +231,9 @@ def _from_rows(
         score=numbers(rows, "score"),
         covariance_px2=sigma[:, :, None] ** 2 * np.eye(2),
         forward_backward_error_px=numbers(rows, "forward_backward_error_px"),
-        is_check=np.array([row.get("role") == "check" for row in rows], bool),
+        is_check=np.array([role == "check" for role in roles], bool),
         more={name: numbers(rows, name) for name in more},
+        states_fit="fit" in roles,
     )
 
 

@@ -14,6 +14,9 @@ from ..rasters.grid import FloatArray, Grid
 from .transform import Transform
 
 USED = "used"
+NONE_HELD_OUT = (
+    "no points took no part in the fit: give check points, or tie points with the role check"
+)
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class TiePoints:
         CRS of the reference map; None: that of the transform at hand, or none at all.
     more
         Further columns of numbers, shape (n,) each, by their names.
+    states_fit
+        Whether the file that they were read from states of any point that it is of the fit.
     """
 
     reference_xy: FloatArray
@@ -51,6 +56,7 @@ class TiePoints:
     state: NDArray[np.str_]
     crs: CRS | None = None
     more: dict[str, FloatArray] = field(default_factory=dict)
+    states_fit: bool = False
 
     def __len__(self) -> int:
         return len(self.reference_xy)
@@ -69,6 +75,14 @@ class TiePoints:
     def check(self) -> NDArray[np.bool_]:
         """Which points, held out of every fit, are measured, shape (n,)."""
         return self.used & self.is_check
+
+    @property
+    def independent(self) -> NDArray[np.bool_]:
+        """Which points can measure a transform that may have been fitted to others, shape (n,).
+
+        Those of the role check; all that are used, if roles are not stated.
+        """
+        return self.check if self.states_fit or self.check.any() else self.used
 
     def residual_px(self, transform: Transform) -> FloatArray:
         """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""
@@ -122,9 +136,11 @@ class TiePoints:
     def concatenate(cls, tables: list[TiePoints]) -> TiePoints:
         """Return the rows of all tables, which have one map and the same further columns."""
         first = tables[0]
-        columns = {name: np.concatenate([getattr(t, name) for t in tables]) for name in _COLUMNS}
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(t, name) for t in tables]) for name in _COLUMNS
+        }
         more = {name: np.concatenate([t.more[name] for t in tables]) for name in first.more}
         return replace(first, **columns, more=more)
 
 
-_COLUMNS = tuple(TiePoints.__dataclass_fields__)[:-2]
+_COLUMNS = tuple(TiePoints.__dataclass_fields__)[:-3]

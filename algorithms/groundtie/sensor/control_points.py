@@ -165,6 +165,7 @@ def read_control_points(
         covariance_px2=_covariances(*spread),
         is_check=stored.is_check,
         more={EDITED: stored.more[EDITED]} if EDITED in stored.more else {},
+        states_fit=stored.states_fit,
     )
     return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines, write_table
 from ..declaration import Output, file_lines, given_files, tool
 from ..errors import TooFewPointsError
+from ..geometry.tie_points import NONE_HELD_OUT
 from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
@@ -106,10 +107,11 @@ def assess_sensor(
         points = read_control_points(
             check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
-        check = points.points.check
-        points = points.take(check if check.any() else points.points.used)
-        if len(points) == 0:
+        if not points.points.used.any():
             raise TooFewPointsError(f"{check_points} holds no points that are used")
+        points = points.take(points.points.independent)
+        if len(points) == 0:
+            raise TooFewPointsError(f"{check_points}: {NONE_HELD_OUT}")
         errors = {BEFORE: SensorErrors.of(oriented.orientation.rpc, points)}
         if refined is not None:
             errors[AFTER] = SensorErrors.of(_refined(refined, stack), points)
