@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 
 import pytest
+from toys import ToyVerdict
 
 from groundtie import errors
 from groundtie.errors import CancelledError, GroundTieError, NotRegisteredError
@@ -58,3 +60,13 @@ def test_a_refusal_carries_its_verdict() -> None:
     assert NotRegisteredError("refused").verdict is None
     verdict = object()
     assert NotRegisteredError("refused", verdict).verdict is verdict  # type: ignore[arg-type]
+
+
+def test_a_refusal_is_values_that_json_can_carry() -> None:
+    assert NotRegisteredError("refused").summary() == {}
+    verdict = ToyVerdict("too few")
+    values = {"verdict": verdict.summary()}
+    assert NotRegisteredError("refused", verdict).summary() == values  # type: ignore[arg-type]
+    error = NotRegisteredError("refused", verdict, ("chips: refused",))  # type: ignore[arg-type]
+    assert error.summary() == {**values, "tried": ["chips: refused"]}
+    assert pickle.loads(pickle.dumps(error)).tried == ("chips: refused",)

@@ -259,7 +259,7 @@ class ToolCommand(click.Command):
                 result = self.tool.run(**checked, progress=progress)
         except NotRegisteredError as error:
             if as_json and error.verdict is not None:
-                _echo_json({"verdict": error.verdict.summary()})
+                _echo_json(error.summary())
             raise
         if as_json:
             _echo_json(result.summary())

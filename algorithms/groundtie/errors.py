@@ -106,13 +106,21 @@ class Refusal(Protocol):
 
 
 class NotRegisteredError(GroundTieError, RuntimeError):
-    """The registration was refused; `verdict` gives the reason."""
+    """The registration was refused; `verdict` gives the reason, `tried` what else was tried."""
 
     exit_code = 3
 
-    def __init__(self, message: str, verdict: Refusal | None = None) -> None:
+    def __init__(
+        self, message: str, verdict: Refusal | None = None, tried: tuple[str, ...] = ()
+    ) -> None:
         super().__init__(message)
         self.verdict = verdict
+        self.tried = tried
+
+    def summary(self) -> dict[str, Any]:
+        """Return what is known of the refusal as values that JSON can carry."""
+        values = {} if self.verdict is None else {"verdict": self.verdict.summary()}
+        return values | ({"tried": list(self.tried)} if self.tried else {})
 
 
 def raised_by(error: Exception, package: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from textured_pairs import TexturedPair, listing
 
-from groundtie.errors import NothingFoundError
+from groundtie.errors import NothingFoundError, NotRegisteredError
 from groundtie.matching.check import CHECK_RADIUS_PX, Check
 from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
@@ -96,6 +96,14 @@ def test_a_refusal_is_one_line_with_what_to_try(registration: Registration) -> N
     assert lost.transform is None and lost.tie_points is None
     with pytest.raises(AssertionError):
         lost.accepted()
+
+
+def test_a_refusal_names_what_was_tried(registration: Registration) -> None:
+    lost = replace(refused(registration), tried=("chips: refused", "keypoints: refused"))
+    assert lost.page().tried == lost.tried
+    with pytest.raises(NotRegisteredError) as caught:
+        lost.require_accepted()
+    assert caught.value.summary()["tried"] == ["chips: refused", "keypoints: refused"]
 
 
 @pytest.mark.slow

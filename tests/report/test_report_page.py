@@ -133,6 +133,13 @@ def test_facts_about_the_images(pair: ImagePair, tmp_path: Path) -> None:
     assert numbers_in(tmp_path)["scene"] == {"reference": "radar, 1 look", "urban": None}
 
 
+def test_what_was_tried_before(pair: ImagePair, tmp_path: Path) -> None:
+    page = written(refused(pair, tried=("chips: refused", "<keypoints>: refused")), tmp_path)
+    assert "What was tried" in [e.text for e in page.all("h2")]
+    assert [e.text for e in page.all("li")] == ["chips: refused", "<keypoints>: refused"]
+    assert numbers_in(tmp_path)["tried"] == ["chips: refused", "<keypoints>: refused"]
+
+
 @pytest.mark.slow
 def test_what_is_masked_is_shown_with_a_tint(pair: ImagePair, tmp_path: Path) -> None:
     keep = np.ones((120, 160), np.uint8)

@@ -102,7 +102,7 @@ class Task:
             raise
         except NotRegisteredError as error:
             status, message = REFUSED, error.one_line()
-            result = {} if error.verdict is None else {"verdict": error.verdict.summary()}
+            result = error.summary()
         except GroundTieError as error:
             message = error.one_line()
         except Exception as error:

@@ -14,7 +14,7 @@ from ..geometry.transform import FloatArray, Transform
 from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
-from ..rasters.grid import Grid, PointFunction, reproject
+from ..rasters.grid import Grid, PointFunction
 from ..rasters.reading import RasterSource
 from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT

@@ -113,7 +113,9 @@ class Registration:
                 image.source.path for image in (self.pair.input, self.pair.reference)
             )
             raise NotRegisteredError(
-                f"{input} was not {done} {reference}: {self.verdict.sentence()}", self.verdict
+                f"{input} was not {done} {reference}: {self.verdict.sentence()}",
+                self.verdict,
+                self.tried,
             )
 
     def warp(
@@ -185,6 +187,7 @@ class Registration:
             transform=self.transform,
             surfaces=self.extreme_surfaces() if with_surfaces else (),
             survey=None if self.evidence is None else self.evidence.surveys.whole,
+            tried=self.tried,
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
             beyond=self.beyond,
@@ -201,12 +204,11 @@ class Registration:
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        values = {
+        return {
             **self.page(with_surfaces=False).summary(),
             "scene": self.scene.summary(),
             "files": given_files(self.files),
         }
-        return values | ({"tried": list(self.tried)} if self.tried else {})
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""

@@ -46,6 +46,8 @@ class Report(Page):
         What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
     beyond
         What of the written image lies outside of the overlap; None: nothing.
+    tried
+        What was tried, a line each; empty where there was nothing to choose.
     """
 
     verdict: Verdict
@@ -57,6 +59,7 @@ class Report(Page):
     scene: Mapping[str, Any]
     survey: Survey | None
     beyond: BeyondOverlap | None = None
+    tried: tuple[str, ...] = ()
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
@@ -70,6 +73,7 @@ class Report(Page):
             "scene": dict(self.scene),
             **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
+            **({"tried": list(self.tried)} if self.tried else {}),
         }
 
     def correction(self) -> Correction | None:
@@ -91,6 +95,7 @@ class Report(Page):
             "residuals": None if self.points is None else self._residual_figures(self.points),
             "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
             "scene": self.scene,
+            "tried": self.tried,
             "details": self._details(),
             "parts": None if self.survey is None else parts.shown(self.survey),
         }
