@@ -91,6 +91,16 @@ def test_advanced_parameters_stand_in_a_table_of_their_own() -> None:
         assert f"| `{spelled(parameter)}` |" in part
 
 
+def test_advice_names_tools_that_can_follow_it() -> None:
+    """A tool without these options, as register, gives it, too."""
+    advice = next(rule.advice for rule in RULES if rule.name == "nothing in common")
+    named = [tool for tool in TOOLS if re.search(rf"\b{tool.name}\b", advice)]
+    assert len(named) == 3
+    for tool in named:
+        names = {parameter.name for parameter in tool.parameters}
+        assert {"search_radius", "search_rotation"} <= names
+
+
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [

@@ -42,7 +42,7 @@ SEARCH_RULES: tuple[Rule, ...] = (
         SEARCH,
         "no place matches better than random ones would",
         "expected false alarms above 1; [Moisan2004]",
-        WIDER,
+        f"{WIDER} (with coregister, match_sar_sar or match_optical)",
         _nothing_found,
     ),
     Rule(
