@@ -19,7 +19,7 @@ from .reading import RasterSource
 from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import read_around, reduction, resample
 from .windows import Mask, Window
-from .writing import create_like, fill_value, keep_apart, require_fit
+from .writing import create_like, fill_value, keep_apart, require_fit, shared_nodata
 
 # Share of the work that is left when all pixels are written: overviews.
 _OVERVIEWS = 0.1
@@ -146,7 +146,8 @@ def warp_raster(
     RasterOpenError
         The pixels cannot be read.
     ParameterError
-        The pixel type cannot hold the raster's nodata value.
+        The pixel type cannot hold the raster's nodata value, or bands hold no data in different
+        ways (see `writing.shared_nodata`).
     CancelledError
         The user cancelled.
     """
@@ -229,7 +230,7 @@ def write_with_geotransform(
 
     Raises
     ------
-    OutputError, RasterOpenError, CancelledError
+    OutputError, RasterOpenError, ParameterError, CancelledError
         As `warp_raster`.
     """
     if (grid.width, grid.height) != (source.grid.width, source.grid.height):
@@ -239,7 +240,7 @@ def write_with_geotransform(
         source,
         grid,
         path,
-        nodata=source.bands[0].nodata,
+        nodata=shared_nodata(source),
         masked=source.has_mask_band,
         rpc_tags=rpc_tags,
         progress=progress.part(1 - _OVERVIEWS, 1),
@@ -252,7 +253,7 @@ def write_with_geotransform(
 
 
 def _choose_nodata(source: RasterSource) -> float | None:
-    declared = source.bands[source.image_bands[0] - 1].nodata
+    declared = shared_nodata(source)
     if declared is not None or source.alpha_band or source.has_mask_band:
         return declared
     return float("nan") if source.dtype.kind == "f" else None

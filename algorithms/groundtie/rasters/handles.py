@@ -152,6 +152,7 @@ def read_by(
         grid=grid or source.grid,
         bands=(band,),
         has_mask_band=False,
+        has_masks_by_band=False,
         colormap=None,
         _handles=handles,
         _overviews=None,

@@ -52,6 +52,8 @@ class RasterSource:
         What the raster states of each band.
     has_mask_band
         Whether a mask that is no band (`.msk`, internal mask, masked array) marks valid pixels.
+    has_masks_by_band
+        Whether such masks of different bands may be different.
     interleave
         "pixel", "band" or None.
     colormap
@@ -64,6 +66,7 @@ class RasterSource:
     grid: Grid
     bands: tuple[BandInfo, ...]
     has_mask_band: bool
+    has_masks_by_band: bool
     interleave: str | None
     colormap: dict[int, tuple[int, ...]] | None
     tags: dict[str, dict[str, str]]
@@ -260,6 +263,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
             grid=grid_of(name, dataset, allow_sensor_geometry=allow_sensor_geometry),
             bands=BandInfo.all_of(dataset),
             has_mask_band=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
+            has_masks_by_band=False,
             interleave=interleaving.value.lower() if interleaving else None,
             colormap=colormap(dataset),
             tags={
@@ -282,11 +286,19 @@ def _source_of_array(raster: Raster) -> RasterSource:
         grid=Grid(transform, raster.crs, raster.width, raster.height),
         bands=(band,) * len(raster.bands),
         has_mask_band=np.ma.is_masked(raster.values),
+        has_masks_by_band=_masks_differ(raster),
         interleave=None,
         colormap=None,
         tags={},
         _handles=ArrayHandles(raster),
     )
+
+
+def _masks_differ(raster: Raster) -> bool:
+    if not np.ma.is_masked(raster.values):
+        return False
+    first, *others = np.ma.getmaskarray(raster.bands)
+    return any((mask != first).any() for mask in others)
 
 
 def bounded_cache() -> Any:

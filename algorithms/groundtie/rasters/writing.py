@@ -222,6 +222,35 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
                 part.update((i + 1) / len(tasks))
 
 
+def shared_nodata(source: RasterSource) -> float | None:
+    """Return the nodata value of all bands of a raster, which a GeoTIFF has one of, or None.
+
+    Raises
+    ------
+    ParameterError
+        Bands declare different nodata values, or have different masks.
+    """
+    declared = [source.bands[number - 1].nodata for number in source.image_bands]
+    # NaN holds no data, whether or not that is declared.
+    if len({None if value != value else value for value in declared}) > 1:
+        listed = ", ".join("none" if value is None else f"{value:g}" for value in declared)
+        raise ParameterError(
+            f"bands of {source.path} declare different nodata values ({listed}), and a GeoTIFF has "
+            "one for all: give them the same (gdalwarp -dstnodata), or write them one by one"
+        )
+    if source.has_masks_by_band and len(declared) > 1:
+        raise different_masks(source)
+    return next((value for value in declared if value is not None), None)
+
+
+def different_masks(source: RasterSource) -> ParameterError:
+    """Return the error that bands hold no data at different pixels, which one mask cannot tell."""
+    return ParameterError(
+        f"bands of {source.path} hold no data at different pixels, and a GeoTIFF has one mask for "
+        "all: give them a nodata value, or write them one by one"
+    )
+
+
 def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:
     """Raise `ParameterError` if pixels of a type cannot hold a nodata value."""
     if not fits(nodata, dtype):

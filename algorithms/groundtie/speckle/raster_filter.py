@@ -16,7 +16,7 @@ from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, require_workable, tile_count, tiles
-from ..rasters.writing import create_like, fill_value
+from ..rasters.writing import create_like, fill_value, shared_nodata
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
 
@@ -49,8 +49,8 @@ class RasterFilter:
         """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
         source = self.source
         require_workable(source.grid, source.path)
-        nodata = None if source.is_complex else source.bands[0].nodata
         like = _as_amplitudes(source) if source.is_complex else source
+        nodata = shared_nodata(like)
         # Without speckle, only the tag identifies it as a radar image.
         like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         workers, masked = context.workers, source.has_mask_band

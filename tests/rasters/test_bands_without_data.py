@@ -1,0 +1,97 @@
+"""Bands that hold no data at different pixels, or say so in different ways."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rasterio
+from raster_files import utm_grid, write_raster
+
+from groundtie.arrays import Raster
+from groundtie.errors import ParameterError
+from groundtie.rasters.delivery import warp_raster, warp_to_array, write_with_geotransform
+from groundtie.rasters.reading import RasterSource, open_raster
+from groundtie.tools.filter_speckle import filter_speckle
+
+GRID = utm_grid(40, 30)
+HOLE = np.s_[5:15, 10:20]
+
+
+def virtual(folder: Path, values: np.ndarray, kind: str, nodata: tuple[Any, ...]) -> Path:
+    """Return a virtual raster of bands, each with its own nodata value."""
+    write_raster(folder / "a.tif", values, GRID)
+    bands = "".join(
+        f'<VRTRasterBand dataType="{kind}" band="{i}">'
+        + ("" if value is None else f"<NoDataValue>{value}</NoDataValue>")
+        + '<SimpleSource><SourceFilename relativeToVRT="1">a.tif</SourceFilename>'
+        f"<SourceBand>{i}</SourceBand></SimpleSource></VRTRasterBand>"
+        for i, value in enumerate(nodata, start=1)
+    )
+    path = folder / "a.vrt"
+    size = f'rasterXSize="{GRID.width}" rasterYSize="{GRID.height}"'
+    place = ", ".join(map(repr, GRID.transform.to_gdal()))
+    path.write_text(
+        f"<VRTDataset {size}><SRS>EPSG:32632</SRS>"
+        f"<GeoTransform>{place}</GeoTransform>{bands}</VRTDataset>"
+    )
+    return path
+
+
+def assert_refused(source: RasterSource, folder: Path, match: str) -> None:
+    """Assert that no raster of all bands is written."""
+    moved = GRID.shifted(3, -2)
+    with pytest.raises(ParameterError, match=match):
+        warp_raster(source, source.grid.map_to_pixel, GRID, folder / "out.tif")
+    with pytest.raises(ParameterError, match=match):
+        warp_to_array(source, source.grid.map_to_pixel, GRID)
+    with pytest.raises(ParameterError, match=match):
+        write_with_geotransform(source, moved, folder / "out.tif")
+    assert not (folder / "out.tif").exists()
+
+
+@pytest.mark.parametrize("nodata", [(0, -9999), (None, -9999), (-9999, None)])
+def test_different_nodata_values_have_no_place_in_a_geotiff(
+    tmp_path: Path, nodata: tuple[Any, ...]
+) -> None:
+    values = np.full((2, 30, 40), 50, np.int16)
+    for band, value in zip(values, nodata, strict=True):
+        band[HOLE] = 50 if value is None else value
+    path = virtual(tmp_path, values, "Int16", nodata)
+    with open_raster(path) as source:
+        assert_refused(source, tmp_path, "different nodata values .*-9999")
+        for band, value in enumerate(nodata, start=1):
+            assert source.read(source.window, band)[1][HOLE].any() == (value is None)
+    with pytest.raises(ParameterError, match="different nodata values"):
+        filter_speckle(path, tmp_path / "out.tif", looks=4)
+
+
+def test_nan_is_no_data_whether_or_not_that_is_declared(tmp_path: Path) -> None:
+    values = np.full((2, 30, 40), 50, np.float32)
+    values[:, 5:15, 10:20] = np.nan
+    with open_raster(virtual(tmp_path, values, "Float32", (None, "nan"))) as source:
+        write_with_geotransform(source, GRID, tmp_path / "out.tif")
+    with rasterio.open(tmp_path / "out.tif") as dataset:
+        np.testing.assert_array_equal(dataset.read_masks() == 0, np.isnan(values))
+
+
+def test_different_masks_have_no_place_in_a_geotiff(tmp_path: Path) -> None:
+    mask = np.zeros((2, 30, 40), bool)
+    mask[1][HOLE] = True
+    values = np.ma.MaskedArray(np.full(mask.shape, 50, np.uint8), mask)
+    with open_raster(Raster(values, GRID.transform, GRID.crs)) as source:
+        assert_refused(source, tmp_path, "at different pixels")
+        assert not source.read(source.window, 2)[1][HOLE].any()
+        assert source.read(source.window, 1)[1].all()
+
+
+def test_one_mask_of_all_bands_is_kept(tmp_path: Path) -> None:
+    mask = np.zeros((2, 30, 40), bool)
+    mask[:, 5:15, 10:20] = True
+    values = np.ma.MaskedArray(np.full(mask.shape, 50, np.uint8), mask)
+    with open_raster(Raster(values, GRID.transform, GRID.crs)) as source:
+        write_with_geotransform(source, GRID, tmp_path / "out.tif")
+    with rasterio.open(tmp_path / "out.tif") as dataset:
+        np.testing.assert_array_equal(dataset.read_masks() == 0, mask)
