@@ -95,3 +95,28 @@ def test_one_mask_of_all_bands_is_kept(tmp_path: Path) -> None:
         write_with_geotransform(source, GRID, tmp_path / "out.tif")
     with rasterio.open(tmp_path / "out.tif") as dataset:
         np.testing.assert_array_equal(dataset.read_masks() == 0, mask)
+
+
+def test_nan_of_complex_numbers_stays_no_data_within_the_image(tmp_path: Path) -> None:
+    values = np.full((2, 30, 40), 50 + 1j, np.complex64)
+    values[:, 5:15, 10:20] = np.nan
+    with open_raster(Raster(values, GRID.transform, GRID.crs)) as source:
+        warp_raster(source, source.grid.map_to_pixel, GRID, tmp_path / "out.tif")
+        array = warp_to_array(source, source.grid.map_to_pixel, GRID)
+    with rasterio.open(tmp_path / "out.tif") as dataset:
+        np.testing.assert_array_equal(dataset.read_masks() == 0, np.isnan(values))
+    np.testing.assert_array_equal(np.ma.getmaskarray(array.values), np.isnan(values))
+
+
+@pytest.mark.parametrize("bands", [2, 20])
+def test_nan_of_complex_numbers_at_different_pixels_has_no_place(
+    tmp_path: Path, bands: int
+) -> None:
+    """One mask cannot tell it, in bands that are worked through together or not."""
+    values = np.full((bands, 30, 40), 50 + 1j, np.complex64)
+    values[-1][HOLE] = np.nan
+    with open_raster(Raster(values, GRID.transform, GRID.crs)) as source:
+        with pytest.raises(ParameterError, match="at different pixels"):
+            warp_raster(source, source.grid.map_to_pixel, GRID, tmp_path / "out.tif")
+        with pytest.raises(ParameterError, match="at different pixels"):
+            warp_to_array(source, source.grid.map_to_pixel, GRID)

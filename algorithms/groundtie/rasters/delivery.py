@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,23 @@ from .reading import RasterSource
 from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import read_around, reduction, resample
 from .windows import Mask, Window
-from .writing import create_like, fill_value, keep_apart, require_fit, shared_nodata
+from .writing import (
+    create_like,
+    different_masks,
+    fill_value,
+    keep_apart,
+    require_fit,
+    shared_nodata,
+)
 
 # Share of the work that is left when all pixels are written: overviews.
 _OVERVIEWS = 0.1
 
 # Bands that are resampled together share their weights, which take as long as one of them.
 _BANDS = 4
+
+# Types of complex numbers with parts that may be NaN.
+_COMPLEX = ("complex64", "complex128")
 
 
 @dataclass(frozen=True)
@@ -57,25 +68,39 @@ class _Warp:
         return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
 
     @property
+    def is_bare(self) -> bool:
+        """Whether neither nodata nor alpha marks pixels without data."""
+        return self.nodata is None and self.source.alpha_band is None
+
+    @cached_property
     def leaves_gaps(self) -> bool:
         """Whether there may be pixels without data that nothing but a mask can mark."""
-        bare = self.nodata is None and self.source.alpha_band is None
-        return self.source.has_mask_band or (bare and not _is_covered(self))
+        # Complex numbers may be NaN, which nobody needs to declare.
+        may_be_nan = any(band.dtype in _COMPLEX for band in self.source.bands)
+        return self.source.has_mask_band or (self.is_bare and (may_be_nan or not _is_covered(self)))
 
     def tiles(
         self, pool: ThreadPoolExecutor, ahead: int, progress: Progress
     ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask]]:
-        """Yield all tiles in groups of bands: place, bands, and what `tile` returns."""
+        """Yield all tiles in groups of bands: place, bands, values, and validity.
+
+        The validity is that of the first band, (h, w).
+        """
         count = tile_count(self.target) * len(self.groups)
+        only_masked = self.is_bare and self.leaves_gaps
         # One by one: there may be any number of them.
         tasks = ((tile, group) for tile in tiles(self.target) for group in self.groups)
         found = in_order(pool, lambda task: (*task, *self.tile(task)), tasks, ahead)
-        for i, tile in enumerate(found):
-            yield tile
+        for i, (place, bands, values, valid) in enumerate(found):
+            if bands[0] == 1:
+                first = valid[0]
+            if only_masked and (valid != first).any():
+                raise different_masks(self.source)
+            yield place, bands, values, first
             progress.update((i + 1) / count)
 
     def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
-        """Return some bands of a tile, (bands, h, w), and the validity of the first, (h, w)."""
+        """Return some bands of a tile and which of their pixels are valid, (bands, h, w)."""
         place, bands = task
         px = coordinates(self.target.window(*place), self.to_input_px)
         size = (self.source.grid.width, self.source.grid.height)
@@ -100,7 +125,7 @@ class _Warp:
             if self.nodata is not None or band == self.source.alpha_band:
                 keep_apart(values, fill)
             values[~known] = fill
-        return out, valid[0]
+        return out, valid
 
 
 def warp_raster(
