@@ -120,3 +120,53 @@ def test_nan_of_complex_numbers_at_different_pixels_has_no_place(
             warp_raster(source, source.grid.map_to_pixel, GRID, tmp_path / "out.tif")
         with pytest.raises(ParameterError, match="at different pixels"):
             warp_to_array(source, source.grid.map_to_pixel, GRID)
+
+
+@pytest.mark.parametrize(
+    ("kind", "nodata"),
+    [("Int64", -(2**63)), ("Int64", -(10**17)), ("Int64", 2**63 - 1), ("UInt64", 2**64 - 1)],
+)
+def test_nodata_values_of_64_bits(tmp_path: Path, kind: str, nodata: int) -> None:
+    values = np.full((1, 30, 40), 50, kind.lower())
+    values[0][HOLE] = nodata
+    hole = values == nodata
+    with open_raster(virtual(tmp_path, values, kind, (nodata,))) as source:
+        np.testing.assert_array_equal(source.read_bands(source.window)[1], ~hole)
+        warp_raster(source, source.grid.map_to_pixel, GRID, tmp_path / "warped.tif")
+        write_with_geotransform(source, GRID, tmp_path / "untouched.tif")
+    for name in ("warped.tif", "untouched.tif"):
+        with rasterio.open(tmp_path / name) as dataset:
+            np.testing.assert_array_equal(dataset.read_masks() == 0, hole)
+            np.testing.assert_array_equal(dataset.read()[~hole], 50)
+
+
+def test_a_nodata_value_of_64_bits_of_an_array(tmp_path: Path) -> None:
+    nodata = 2**63 - 1
+    values = np.full((600, 600), 50, np.int64)
+    values[:300] = nodata
+    with open_raster(Raster(values, GRID.transform, GRID.crs, nodata)) as source:
+        write_with_geotransform(source, source.grid, tmp_path / "out.tif")
+    for level in ({}, {"overview_level": 0}):
+        with rasterio.open(tmp_path / "out.tif", **level) as dataset:
+            valid = dataset.read_masks(1) > 0
+            assert not valid[: dataset.height // 2].any()
+            assert valid[dataset.height // 2 :].all()
+
+
+def test_masks_of_single_bands_count(tmp_path: Path) -> None:
+    """GDAL's VRT has them; only where they stand alone one GeoTIFF can tell them."""
+    values = np.full((2, 30, 40), 50, np.uint8)
+    mask = np.full((30, 40), 255, np.uint8)
+    mask[HOLE] = 0
+    write_raster(tmp_path / "m.tif", mask, GRID)
+    path = virtual(tmp_path, values, "Byte", (None, None))
+    of_band = (
+        '<MaskBand><VRTRasterBand dataType="Byte"><SimpleSource>'
+        '<SourceFilename relativeToVRT="1">m.tif</SourceFilename><SourceBand>1</SourceBand>'
+        "</SimpleSource></VRTRasterBand></MaskBand></VRTRasterBand></VRTDataset>"
+    )
+    path.write_text(path.read_text().replace("</VRTRasterBand></VRTDataset>", of_band))
+    with open_raster(path) as source:
+        assert source.read(source.window, 1)[1].all()
+        np.testing.assert_array_equal(source.read(source.window, 2)[1], mask > 0)
+        assert_refused(source, tmp_path, "at different pixels")

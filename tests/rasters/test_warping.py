@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ from raster_files import utm_grid, wave_image, waves, write_raster
 
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.lattice import coordinates, lattice
+from groundtie.rasters.metadata import rounded
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.rasters.warping import METHODS, reduction, resample, sample, source_window
 
@@ -173,6 +175,14 @@ def test_integers_are_rounded_and_clipped() -> None:
     assert values[10, 8] == 0
     assert values[10, 10] == 255
     assert values[10, 9] == 128
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint64])
+def test_the_largest_integers_do_not_wrap(dtype: Any) -> None:
+    largest = np.iinfo(dtype).max
+    for precision in (np.float32, np.float64):
+        values = rounded(np.array([largest, 2.0 * largest], precision), np.dtype(dtype))
+        np.testing.assert_allclose(values.astype(float), float(largest), rtol=1e-7)
 
 
 def test_complex_values_keep_their_phase() -> None:

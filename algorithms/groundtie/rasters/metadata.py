@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from rasterio.enums import ColorInterp
+from rasterio.enums import ColorInterp, MaskFlags
 
 from ..errors import GeoreferencingError, raised_by
 from .grid import PIXEL_COORDINATES, Grid, is_invertible, require_map
@@ -75,6 +75,14 @@ def stated(read: Callable[[], T]) -> T:
         return read()
 
 
+def has_own_mask(flags: Collection[MaskFlags], nodata: float | None) -> bool:
+    """Return whether only its own mask states which pixels of a band are valid.
+
+    For rasterio, nodata values that double precision rounds out of the range of 64 bits are none.
+    """
+    return not flags or (set(flags) == {MaskFlags.nodata} and nodata is None)
+
+
 def tags_of(dataset: Any, **which: Any) -> dict[str, str]:
     """Return the tags of a domain (`ns`) or band (`bidx`) of a rasterio dataset.
 
@@ -107,7 +115,10 @@ def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
         return values.astype(dtype, copy=False)
     limits = np.iinfo(dtype)
     np.rint(values, out=values)
-    return np.clip(values, limits.min, limits.max, out=values).astype(dtype)
+    highest = values.dtype.type(limits.max)
+    if int(highest) > limits.max:  # rounded up to a number that the other type would wrap
+        highest = np.nextafter(highest, values.dtype.type(0))
+    return np.clip(values, limits.min, highest, out=values).astype(dtype)
 
 
 def fits(value: float, dtype: np.dtype[Any]) -> bool:

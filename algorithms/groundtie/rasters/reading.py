@@ -27,6 +27,7 @@ from .metadata import (
     BandInfo,
     colormap,
     grid_of,
+    has_own_mask,
     numpy_dtype,
     stated,
     tags_of,
@@ -256,14 +257,17 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
             raise RasterOpenError(
                 f"{name} has {dataset.count} bands; at most {MOST_BANDS} are read"
             )
-        flags = stated(lambda: dataset.mask_flag_enums[0])
+        flags = stated(lambda: dataset.mask_flag_enums)
+        bands = BandInfo.all_of(dataset)
+        of_all = MaskFlags.per_dataset in flags[0] and MaskFlags.alpha not in flags[0]
+        by_band = any(map(has_own_mask, flags, (band.nodata for band in bands)))
         interleaving = stated(lambda: dataset.interleaving)
         return RasterSource(
             path=name,
             grid=grid_of(name, dataset, allow_sensor_geometry=allow_sensor_geometry),
-            bands=BandInfo.all_of(dataset),
-            has_mask_band=MaskFlags.per_dataset in flags and MaskFlags.alpha not in flags,
-            has_masks_by_band=False,
+            bands=bands,
+            has_mask_band=of_all or by_band,
+            has_masks_by_band=by_band,
             interleave=interleaving.value.lower() if interleaving else None,
             colormap=colormap(dataset),
             tags={

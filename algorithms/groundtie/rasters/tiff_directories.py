@@ -24,7 +24,7 @@ BLOCK = 512
 _KIND, _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _COLOURS = 254, 256, 257, 258, 259, 262
 _SAMPLES, _PLANES, _PALETTE, _OFFSETS, _COUNTS = 277, 284, 320, 324, 325
 _PREDICTOR, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _FORMAT, _NODATA = 317, 322, 323, 338, 339, 42113
-_SHORT, _LONG, _LONG8 = 3, 4, 16
+_ASCII, _SHORT, _LONG, _LONG8 = 2, 3, 4, 16
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 16: 8, 17: 8}
 
 # What an overview states as its image does, besides its size.
@@ -113,7 +113,9 @@ class Image:
         return sorted({**self.tags, **made}.items())
 
 
-def base_image(template: bytes, width: int, height: int, masked: bool) -> Image:
+def base_image(
+    template: bytes, width: int, height: int, masked: bool, nodata: int | None = None
+) -> Image:
     """Return a raster's image of a size with what a template states, without blocks yet.
 
     Parameters
@@ -124,8 +126,14 @@ def base_image(template: bytes, width: int, height: int, masked: bool) -> Image:
         In pixels.
     masked
         Whether it has a mask, of one bit a pixel.
+    nodata
+        The nodata value of integers; None: what the template states. rasterio writes large ones as
+        floating-point numbers, of which GDAL reads the digits before the point.
     """
     tags = tags_of(template)
+    if nodata is not None:
+        text = f"{nodata}\0".encode()
+        tags[_NODATA] = (_ASCII, len(text), text)
     separate = _number(tags[_PLANES]) == 2
     of_mask = {
         _KIND: _long(_MASK),

@@ -105,7 +105,8 @@ def create_like(
     profile = _profile(source, grid, nodata, interleave, pixels)
     with writing(path):
         template, beside = _template(source, profile, rpc_tags)
-    levels = [base_image(template, grid.width, grid.height, masked)]
+    whole = None if nodata is None or source.dtype.kind not in "iu" else int(nodata)
+    levels = [base_image(template, grid.width, grid.height, masked, whole)]
     while max(levels[-1].width, levels[-1].height) > BLOCK:
         levels.append(levels[-1].overview())
     is_cog = final_name(path).lower().endswith(COG_SUFFIXES)
