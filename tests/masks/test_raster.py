@@ -40,6 +40,17 @@ def test_a_coarser_mask_covers_the_pixels_below_its_own(tmp_path: Path) -> None:
     np.testing.assert_array_equal(mask.select(Window(33, 20, 20, 10)).part, expected[20:30, 33:53])
 
 
+def test_what_a_finer_mask_leaves_out_is_left_out_however_narrow(tmp_path: Path) -> None:
+    values = np.full((180, 240), 4, np.uint8)
+    values[:, 0:120:3] = 9
+    path = write_raster(tmp_path / "m.tif", values, utm_grid(240, 180, 2.0 / 3))
+    mask = RasterMask(scene_of(tmp_path), open_raster(path), mask_values("scl"))
+    expected = np.zeros((60, 80), bool)
+    expected[5:, 40:] = True
+    np.testing.assert_array_equal(mask.select(mask.scene.whole).part, expected)
+    np.testing.assert_array_equal(mask.select(Window(33, 20, 20, 10)).part, expected[20:30, 33:53])
+
+
 def test_a_mask_on_another_map_lies_where_it_should(tmp_path: Path) -> None:
     path = write_raster(tmp_path / "utm.tif", classes(80, 60), GRID)
     with rasterio.open(path) as source:

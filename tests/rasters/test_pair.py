@@ -339,6 +339,33 @@ def test_mask_rasters_lie_on_the_map(files: Files, which: str, grid: Grid) -> No
     assert patch.valid[3:-3, 42:-3].all()
 
 
+@pytest.mark.parametrize("which", ["reference", "input"])
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_what_a_mask_hides_takes_no_part_however_narrow(
+    files: Files, which: str, phase: int
+) -> None:
+    """Matching pixels of 3 × 3: every one of the left half has hidden columns, none elsewhere."""
+    keeps = np.ones((99, 120), np.uint8)
+    keeps[:, :60][:, np.arange(60) % 3 != phase] = 0
+    mask = files.open(keeps, utm_grid(120, 99))
+    images = {"reference": files.image(), "input": files.image()}
+    images[which] = Image(images[which].source, None, mask)
+    pair = make_pair(**images, matching_pixel_size_m=30.0)
+    patch = dict(zip(("reference", "input"), both(pair), strict=True))[which]
+    assert patch.valid.shape[1] == 40
+    assert not patch.valid[:, :20].any()
+    assert patch.valid[1:-1, 21:-1].all()
+    # On a coarser level the centre decides: what takes part here must not vanish there.
+    coarse = pair.grid.scaled(4)
+    level = (
+        pair.reference_patch(coarse)
+        if which == "reference"
+        else pair.input_patch(coarse, pair.nominal_px)
+    )
+    assert not level.valid[:, :5].any()
+    assert level.valid[1:-1, 6:-1].all()
+
+
 def test_a_mask_goes_with_the_input_where_it_is_moved(files: Files) -> None:
     hidden = np.ones((100, 120), np.uint8)
     hidden[:, :40] = 0

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
+from ..rasters.raster_masks import kept_on, mask_span
 from ..rasters.reading import Mask, RasterSource, Window
-from .scene import Scene, Selection, sampled_onto
+from .scene import Scene, Selection
 
 # What a vector layer is if it shows what takes no part.
 INSIDE = "inside"
@@ -110,6 +111,11 @@ class RasterMask:
         """Return which pixels of a window take part."""
         bands = tuple(replace(band, nodata=None) for band in self.mask.bands)
         mask = replace(self.mask, bands=bands, has_mask_band=False)
-        found, inside = sampled_onto(self.scene.grid.window(*window), mask, "nearest", 1)
+        grid = self.scene.grid
+        to_mask = grid.to_pixels_of(mask.grid)
+        span = mask_span(mask, grid, to_mask)
+        kept = kept_on(
+            mask, grid.window(*window), to_mask, lambda found: ~self.values.excluded(found), span
+        )
         valid = self.scene.read(window).valid
-        return Selection(valid & inside & ~self.values.excluded(found), valid)
+        return Selection(valid & kept, valid)

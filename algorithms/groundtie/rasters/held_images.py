@@ -67,7 +67,7 @@ def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) 
     if image.mask is not None and shown is not None:
         mask = read_by(image.mask, ArrayHandles(Raster(shown)), BandInfo.plain("uint8"), grid)
     source = _held(image.source, grid, values, valid)
-    return replace(image, source=source, band=1, mask=mask, colours=None)
+    return replace(image, source=source, band=1, mask=mask, mask_span=(1, 1), colours=None)
 
 
 def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:

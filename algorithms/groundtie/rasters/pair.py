@@ -11,6 +11,7 @@ from ..geometry.limits import SearchLimits
 from .colours import Colours
 from .grid import FloatArray, Grid, PointFunction, finite
 from .patch import Patch, empty_areas
+from .raster_masks import kept_on, mask_span
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import sample, sample_bands
 
@@ -40,6 +41,9 @@ class Image:
     mask
         A raster on the same map whose pixels state which of the image's take part: those with 0
         or without data do not. None: all that are valid.
+    mask_span
+        Columns and rows of the mask that take part together only: those that a matching pixel
+        spans (see `masked`).
     mask_note
         What a user should know of the mask.
     mask_hides
@@ -51,6 +55,7 @@ class Image:
     source: RasterSource
     band: int | None = None
     mask: RasterSource | None = None
+    mask_span: tuple[int, int] = (1, 1)
     mask_note: str = ""
     mask_hides: bool = False
     colours: Colours | None = None
@@ -82,15 +87,29 @@ class Image:
     def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
         """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
         assert self.mask is not None
-        own, to_mask = self.source.grid, self.source.grid.to_pixels_of(self.mask.grid)
-        shown, known = sample(
-            self.mask, grid, lambda xy: to_mask(own.pixel_to_map(to_px(xy))), "nearest", 1
-        )
-        return known & (shown != 0)
+        to_mask = _to_mask_px(self.source, self.mask, to_px)
+        return kept_on(self.mask, grid, to_mask, lambda shown: shown != 0, self.mask_span)
+
+    def masked(self, mask: RasterSource, matching: Grid) -> Image:
+        """Return the image with a mask, whose pixels may be smaller than those of matching.
+
+        No matching pixel takes part of which the mask hides a part, however narrow: also on
+        coarser levels, whose pixels are as those of matching at their centres.
+        """
+        to_px = matching.to_pixels_of(self.source.grid)
+        span = mask_span(mask, matching, _to_mask_px(self.source, mask, to_px))
+        is_so = mask is self.mask and span == self.mask_span
+        return self if is_so else replace(self, mask=mask, mask_span=span)
 
     def bands_onto(self, grid: Grid, to_px: PointFunction) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
         return sample_bands(self.source, grid, to_px)[0]
+
+
+def _to_mask_px(source: RasterSource, mask: RasterSource, to_px: PointFunction) -> PointFunction:
+    """Return what takes map positions to pixels of a raster's mask, given what does to its own."""
+    to_mask = source.grid.to_pixels_of(mask.grid)
+    return lambda xy: to_mask(source.grid.pixel_to_map(to_px(xy)))
 
 
 @dataclass(frozen=True)
@@ -223,6 +242,10 @@ def make_pair(
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
     around = _surroundings(reach, radius_px, None if limits.is_shift else nominal)
+    reference, input = (
+        image if image.mask is None else image.masked(image.mask, grid)
+        for image in (reference, input)
+    )
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
 
 

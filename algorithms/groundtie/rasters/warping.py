@@ -195,7 +195,7 @@ def sample(
     values, valid
         Shape (height, width) of the grid; float32, 0 where invalid, and bool.
     """
-    return _sample(
+    return sample_by(
         source, grid, to_input_px, method, lambda part, out: source.read(part, band, out)
     )
 
@@ -217,13 +217,21 @@ def sample_bands(
         values = np.abs(values) if source.is_complex else values
         return np.where(everywhere, values, 0).astype(np.float32), everywhere
 
-    return _sample(source, grid, to_input_px, "cubic", read)
+    return sample_by(source, grid, to_input_px, "cubic", read)
 
 
-def _sample(
-    source: RasterSource, grid: Grid, to_input_px: PointFunction, method: str, read: Read
+def sample_by(
+    source: RasterSource,
+    grid: Grid,
+    to_input_px: PointFunction,
+    method: str,
+    read: Read,
+    factor: tuple[int, int] | None = None,
 ) -> tuple[FloatImage, Mask]:
-    """Return `sample` of what `read` reads of a window, shape ([bands,] height, width)."""
+    """Return `sample` of what `read` reads of a window, shape ([bands,] height, width).
+
+    Of so many columns and rows as `factor` states the mean is taken first; None: as in `sample`.
+    """
     if isinstance(to_input_px, DenseMap):
         px = to_input_px.coordinates(grid)
     else:
@@ -233,7 +241,8 @@ def _sample(
             return read(window, None)
         px = nodes.coordinates()
     size = (source.grid.width, source.grid.height)
-    factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
+    if factor is None:
+        factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
     part = read_around(px, size, method, factor, read)
     if part is None:
         nothing, shape = read(Window(0, 0, 0, 0), None)[0], (grid.height, grid.width)

@@ -154,7 +154,8 @@ def with_user_masks(
             continue
         mask = given if isinstance(given, UserMask) else UserMask(given)
         if mask.is_zeros:
-            image = replace(getattr(pair, name), mask=stack.enter_context(open_raster(mask.mask)))
+            raster = stack.enter_context(open_raster(mask.mask))
+            image = getattr(pair, name).masked(raster, pair.grid)
             pair = replace(pair, **{name: image})
             continue
         scene = scene_of(pair, name)
@@ -215,7 +216,7 @@ def with_mask(
     The mask is a file until the stack is closed.
     """
     mask, share = drawn_mask(scene, select, stack, context.quiet().progress)
-    return replace(pair, **{name: replace(getattr(pair, name), mask=mask)}), share
+    return replace(pair, **{name: getattr(pair, name).masked(mask, pair.grid)}), share
 
 
 def drawn_mask(

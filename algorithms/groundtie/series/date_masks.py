@@ -64,7 +64,8 @@ def _selection(scene: Scene, source: RasterSource, mask: UserMask, stack: ExitSt
     if mask.values is not None:
         return select_drawn(scene, mask, stack)
     raster = stack.enter_context(open_raster(mask.mask))
-    image, grid = Image(source, mask=raster), source.grid
+    grid = source.grid
+    image = Image(source).masked(raster, grid)
 
     def select(window: Window) -> Selection:
         valid = scene.read(window).valid
