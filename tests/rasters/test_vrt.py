@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,33 @@ def test_only_shifts_leave_pixels_untouched(tmp_path: Path, image: Path) -> None
     with pytest.raises(ParameterError, match="untouched pixels go with model translation"):
         groundtie.coregister(image, image.with_name("c.tif"), output, model="affine")
     assert not list(output.parent.iterdir())
+
+
+def test_a_file_in_an_archive_is_found_from_any_folder(
+    tmp_path: Path, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with zipfile.ZipFile(tmp_path / "in" / "a.zip", "w") as archive:
+        archive.write(image, "a.tif")
+    output = tmp_path / "out" / "b.vrt"
+    monkeypatch.chdir(tmp_path)
+    transform = stored(tmp_path / "t.json", SHIFT)
+    groundtie.warp("/vsizip/in/a.zip/a.tif", output, transform=transform)
+    monkeypatch.chdir(tmp_path / "out")
+    with rasterio.open(output) as moved:
+        np.testing.assert_array_equal(moved.read(), VALUES)
+
+
+def test_other_names_that_are_relative_to_the_working_folder_are_refused(
+    tmp_path: Path, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    transform = stored(tmp_path / "t.json", SHIFT)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ParameterError, match="give the whole path"):
+        groundtie.warp("GTIFF_DIR:1:in/a.tif", "out/b.vrt", transform=transform)
+    groundtie.warp(f"GTIFF_DIR:1:{image}", "out/b.vrt", transform=transform)
+    monkeypatch.chdir(tmp_path / "out")
+    with rasterio.open("b.vrt") as moved:
+        np.testing.assert_array_equal(moved.read(), VALUES)
 
 
 def test_an_array_is_no_file(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,6 +17,12 @@ from .reading import RasterSource
 from .remote import environment
 
 SUFFIX = ".vrt"
+
+# GDAL's name of what lies in an archive, whose path has no slash at its start.
+_IN_ARCHIVE = re.compile(r"(/vsi(?:zip|tar|gzip|7z|rar)/)([^/{].*)")
+
+# What stands between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one.
+_PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
 # What else would locate the pixels, or is of the file that they are in.
 _OWN = ("GCPList", "GeoTransform")
@@ -39,14 +46,13 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
     Raises
     ------
     ParameterError
-        The raster is in memory.
+        The raster is in memory, or its name means another file in another working folder.
     OutputError
         The file cannot be written.
     """
     if not source.is_file:
         raise ParameterError(f"a {SUFFIX} refers to a file, which {source.path} is not")
-    # GDAL leaves a path that is relative to the working folder so.
-    name = os.path.abspath(source.path) if os.path.exists(source.path) else source.path
+    name = _absolute(source.path)
     with writing(path), scratch_file(path) as scratch, environment(source.path):
         rasterio.shutil.copy(name, scratch, driver="VRT")
         root = ElementTree.parse(scratch).getroot()
@@ -64,6 +70,21 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
             tag = ElementTree.SubElement(ElementTree.SubElement(root, "Metadata"), "MDI", key=key)
             tag.text = value
         ElementTree.ElementTree(root).write(path, encoding="utf-8")
+
+
+def _absolute(name: str) -> str:
+    """Return a raster's name that means the same in any working folder: GDAL makes none so."""
+    if os.path.exists(name):
+        return os.path.abspath(name)
+    archive = _IN_ARCHIVE.fullmatch(name)
+    if archive and any(os.path.isfile(path) for path in (archive[2], *Path(archive[2]).parents)):
+        return archive[1] + os.path.abspath(archive[2])
+    if any(os.path.exists(part) and not os.path.isabs(part) for part in _PARTS.split(name)):
+        raise ParameterError(
+            f"a {SUFFIX} cannot refer to {name}, which is relative to the working folder: "
+            "give the whole path"
+        )
+    return name
 
 
 def _relative(name: str, folder: Path) -> str:
