@@ -48,7 +48,7 @@ class HeldOut:
         reach = self._reach_px(piece)
         if not self._has_axes_of(piece):
             px = self._matching_px(piece, mesh(cols, rows))
-            return self.layout.is_held_out(px, reach).reshape(piece.height, piece.width)
+            return self.layout.held_out(px, reach).reshape(piece.height, piece.width)
         along_cols = self._matching_px(piece, np.column_stack([cols, np.zeros_like(cols)]))
         along_rows = self._matching_px(piece, np.column_stack([np.zeros_like(rows), rows]))
         return self.layout.held_out_mask(along_cols[:, 0], along_rows[:, 1], reach)

@@ -144,7 +144,7 @@ class ChipLayout:
         )
         return np.asarray(row * self.columns.cells + col)
 
-    def is_held_out(self, px: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
+    def held_out(self, px: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
         """Return which positions (col, row), (n, 2), are held out, or within reach: (n,)."""
         cols, rows = px.T
         return self.columns.held_out(cols, reach_px) & self.rows.held_out(rows, reach_px)
