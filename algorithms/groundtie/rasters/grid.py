@@ -18,6 +18,7 @@ import rasterio.warp
 from affine import Affine
 from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
+from rasterio.errors import CRSError
 
 from ..errors import GeoreferencingError, raised_by
 
@@ -269,9 +270,15 @@ def require_map(crs: CRS | None) -> CRS | None:
     ------
     GeoreferencingError
         It is local (engineering), geocentric or vertical: nothing leads from it to a map. Or its
-        unit is none of lengths.
+        unit is none of lengths, or it holds what no file can carry.
     """
-    if crs is None or crs.is_geographic:
+    if crs is None:
+        return None
+    try:
+        text = crs.to_wkt()
+    except CRSError as error:
+        raise GeoreferencingError(f"a CRS cannot be written: {error}") from error
+    if crs.is_geographic:
         return crs
     if crs.is_projected:
         unit, metres = crs.linear_units_factor
@@ -279,7 +286,7 @@ def require_map(crs: CRS | None) -> CRS | None:
             raise GeoreferencingError(f"a CRS has a unit ({unit[:40]}) of {metres:g} m")
         return crs
     raise GeoreferencingError(
-        f"a CRS is neither projected nor geographic ({crs.to_wkt()[:40]}…); give it the CRS of its "
+        f"a CRS is neither projected nor geographic ({text[:40]}…); give it the CRS of its "
         "map, or none (gdal_edit.py -a_srs)"
     )
 
