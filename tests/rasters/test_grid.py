@@ -123,6 +123,8 @@ def test_metres_per_degree_shrink_with_the_latitude() -> None:
     assert north.metres_per_unit[1] == pytest.approx(111_195, rel=1e-3)
     # 111.195 m by half of it
     assert north.pixel_size_m == pytest.approx(111.195 * math.sqrt(0.5), rel=1e-3)
+    assert north.pixel_sides_m == pytest.approx((111.195 / 2, 111.195), rel=1e-3)
+    assert north.metres_per_pixel == pytest.approx(111.195, rel=1e-3)
 
 
 def test_feet_are_not_metres() -> None:

@@ -194,6 +194,14 @@ def test_the_default_search_radius(grid: Grid, radius: float) -> None:
     assert default_radius_m(grid) == pytest.approx(radius)
 
 
+def test_a_radius_in_metres_is_kept_along_both_axes_of_degrees(files: Files) -> None:
+    """At 60° north pixels of 0.0001° are 5.6 m wide and 11.1 m high."""
+    grid = Grid(Affine(1e-4, 0, 9, 0, -1e-4, 60.005), GEOGRAPHIC, 120, 100)
+    part = grid.window(30, 30, 60, 40)
+    pair = make_pair(files.image(grid), files.image(part), search_radius_m=55.0)
+    assert pair.grid == grid.window(20, 20, 80, 60)
+
+
 def test_images_without_georeferencing_are_matched_in_pixels(files: Files) -> None:
     plain = Grid(PIXEL_COORDINATES, None, 120, 100)
     values = wave_image(GRID, LENGTH_M).astype(np.float32)

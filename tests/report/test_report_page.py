@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from affine import Affine
 from html_pages import Page, picture_of
 from known_reports import (
     ACCEPTED,
@@ -23,9 +24,12 @@ from known_reports import (
     written,
 )
 from raster_files import write_raster
+from rasterio.crs import CRS
 
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import ImagePair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.verdict import Verdict
@@ -105,6 +109,14 @@ def test_rotation_and_scale_are_those_of_the_transform(
     assert found.rotation_deg == pytest.approx(2, abs=1e-6)
     assert found.scale == pytest.approx(1 / 1.03, rel=1e-6)
     assert "rotated by 2.00° anticlockwise, scaled by 0.9709" in found.text()
+
+
+def test_metres_in_degrees_are_those_along_each_axis() -> None:
+    """At 60° north a degree has half as many metres to the east as to the north."""
+    grid = Grid(Affine(1e-4, 0, 9, 0, -1e-4, 60.005), CRS.from_epsg(4326), 100, 100)
+    found = Correction.of(Transform(shift_model(-6e-4, -4e-4), grid.crs, grid), grid)
+    assert found.direction == "33.4 m east, 44.5 m north"
+    assert f"7.2 px ({math.hypot(33.4, 44.5):.1f} m) at the centre" in found.text()
 
 
 def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:

@@ -139,7 +139,7 @@ def _places(
 ) -> list[Peak]:
     """Search all shifts from a model on, and return the highest peaks of their similarity."""
     # The true place may lie a pixel of the level further than whole pixels show.
-    radius_px = int(np.ceil(radius_m / level.pixel_size_m)) + 1
+    radius_px = int(np.ceil(radius_m / min(level.pixel_sides_m))) + 1
     # Farther off too little of the images overlaps.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
     reach = radius_px + BORDER_PX

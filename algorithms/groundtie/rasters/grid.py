@@ -162,10 +162,19 @@ class Grid:
         area = abs(t.a * t.e - t.b * t.d) * self.metres_per_unit[0] * self.metres_per_unit[1]
         return float(np.sqrt(area))
 
+    @cached_property
+    def pixel_sides_m(self) -> tuple[float, float]:
+        """Width and height of a pixel, in metres (in pixels without georeferencing)."""
+        t, (x, y) = self.transform, self.metres_per_unit
+        return float(np.hypot(t.a * x, t.d * y)), float(np.hypot(t.b * x, t.e * y))
+
     @property
     def metres_per_pixel(self) -> float | None:
-        """The same; None without georeferencing, where nobody knows it."""
-        return self.pixel_size_m if self.is_georeferenced else None
+        """Metres of a pixel along its longer side: no error in pixels is stated too small by it.
+
+        None without georeferencing, where nobody knows it.
+        """
+        return max(self.pixel_sides_m) if self.is_georeferenced else None
 
     @property
     def centre_px(self) -> tuple[float, float]:

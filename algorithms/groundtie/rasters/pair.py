@@ -236,8 +236,10 @@ def make_pair(
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
     if not limits.is_shift:
         outline = _rotated(outline, rotation_deg, scale)
-    limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * grid.pixel_size_m))
-    radius_px = limits.radius / grid.pixel_size_m
+    # So many pixels along either side that the radius is kept along the shorter one, too.
+    side_m = min(grid.pixel_sides_m)
+    limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * side_m))
+    radius_px = limits.radius / side_m
     reach = _box(grid, outline, radius_px)
     assert reach is not None
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)

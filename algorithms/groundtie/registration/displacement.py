@@ -55,7 +55,7 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
         x, y = values[:2].copy()
         values[0] = (t.a * x + t.b * y) * per_unit[0]
         values[1] = (t.d * x + t.e * y) * per_unit[1]
-        values[2] *= matching.pixel_size_m
+        values[2] *= max(matching.pixel_sides_m)
     shown = transform.input_grid.contains(transform(xy)).reshape(rows, cols)
     return np.where(shown, values, np.nan), grid
 

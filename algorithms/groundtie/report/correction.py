@@ -26,8 +26,8 @@ class Correction:
         By how much the input is rotated, anticlockwise as it is seen.
     scale
         By which factor it is enlarged.
-    metres_per_px
-        Size of a matching pixel; None without georeferencing.
+    centre_m
+        Length at the centre on the ground; None without georeferencing.
     """
 
     centre_px: float
@@ -36,7 +36,7 @@ class Correction:
     direction: str
     rotation_deg: float
     scale: float
-    metres_per_px: float | None
+    centre_m: float | None
 
     @classmethod
     def of(cls, transform: Transform, grid: Grid) -> Correction:
@@ -53,14 +53,14 @@ class Correction:
             float(lengths.max()),
             move_in_words(move, grid),
             *_turn(nominal, xy, grid),
-            grid.metres_per_pixel,
+            float(np.hypot(*(move * grid.metres_per_unit))) if grid.is_georeferenced else None,
         )
 
     def text(self) -> str:
         """Return the size of the correction in words, in the order of what is looked for first."""
         size, in_metres = f"{self.centre_px:.1f} px", ""
-        if self.metres_per_px is not None:
-            in_metres = f" ({self.centre_px * self.metres_per_px:.1f} m)"
+        if self.centre_m is not None:
+            in_metres = f" ({self.centre_m:.1f} m)"
         direction = f": {self.direction}" if self.direction else ""
         rotated = "not rotated"
         # what two decimals show
@@ -76,7 +76,7 @@ class Correction:
 
     def summary(self) -> dict[str, Any]:
         """Return the correction as values that JSON can carry."""
-        return {name: value for name, value in vars(self).items() if name != "metres_per_px"}
+        return {name: value for name, value in vars(self).items() if name != "centre_m"}
 
 
 def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> tuple[float, float]:
