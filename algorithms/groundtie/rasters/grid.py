@@ -8,6 +8,7 @@ everywhere else (the first pixel's centre is at 0).
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
@@ -35,6 +36,9 @@ METRES_PER_DEGREE = 111_195.0
 
 # No unit shrinks by more than this towards a pole, whose own units have no length.
 _LEAST_SHRINK = 1e-6
+
+# The name of a datum and the parameters that lead to WGS 84, in WKT 1.
+_DATUM = re.compile(r'DATUM\["[^"]*"|TOWGS84\[[^]]*\]')
 
 # The ellipsoid of WGS 84: equatorial radius, and square of the eccentricity.
 _RADIUS_M, _ECCENTRICITY2 = 6_378_137.0, 0.00669437999014
@@ -348,7 +352,7 @@ _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
 def epsg_of(crs: CRS) -> int | None:
     """Return the EPSG code of exactly this CRS; None: there is none."""
     code = crs.to_epsg()
-    return code if code is not None and CRS.from_epsg(code) == crs else None
+    return code if code is not None and _is_same(CRS.from_epsg(code), crs) else None
 
 
 def crs_name(crs: CRS) -> str:
@@ -356,7 +360,13 @@ def crs_name(crs: CRS) -> str:
     # GDAL's code may be the nearest one, which has another datum than an unknown one, or one with
     # parameters of its own.
     name = str(crs.to_string())
-    return name if CRS.from_user_input(name) == crs else str(crs.to_wkt())
+    return name if _is_same(CRS.from_user_input(name), crs) else str(crs.to_wkt())
+
+
+def _is_same(one: CRS, other: CRS) -> bool:
+    # For rasterio before 1.4 those with the same nearest code are equal.
+    datum, others = (_DATUM.findall(crs.to_wkt()) for crs in (one, other))
+    return bool(one == other) and datum == others
 
 
 def crs_to_text(crs: CRS | None) -> str | None:
