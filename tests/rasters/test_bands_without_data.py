@@ -19,6 +19,11 @@ from groundtie.tools.filter_speckle import filter_speckle
 GRID = utm_grid(40, 30)
 HOLE = np.s_[5:15, 10:20]
 
+EXACT_IN_64_BITS = pytest.mark.skipif(
+    rasterio.__version__ < "1.4",
+    reason="masks by nodata values of 64 bits are computed in double precision",
+)
+
 
 def virtual(folder: Path, values: np.ndarray, kind: str, nodata: tuple[Any, ...]) -> Path:
     """Return a virtual raster of bands, each with its own nodata value."""
@@ -122,6 +127,7 @@ def test_nan_of_complex_numbers_at_different_pixels_has_no_place(
             warp_to_array(source, source.grid.map_to_pixel, GRID)
 
 
+@EXACT_IN_64_BITS
 @pytest.mark.parametrize(
     ("kind", "nodata"),
     [("Int64", -(2**63)), ("Int64", -(10**17)), ("Int64", 2**63 - 1), ("UInt64", 2**64 - 1)],
@@ -140,6 +146,7 @@ def test_nodata_values_of_64_bits(tmp_path: Path, kind: str, nodata: int) -> Non
             np.testing.assert_array_equal(dataset.read()[~hole], 50)
 
 
+@EXACT_IN_64_BITS
 def test_a_nodata_value_of_64_bits_of_an_array(tmp_path: Path) -> None:
     nodata = 2**63 - 1
     values = np.full((600, 600), 50, np.int64)
