@@ -14,6 +14,7 @@ from raster_files import write_raster
 from rpc_models import camera_rpc
 from toys import TOY
 
+from groundtie.batches import calls, input_files
 from groundtie.batches.calls import Call, make_calls
 from groundtie.errors import ParameterError
 from groundtie.sensor.rpc_files import write_rpc
@@ -185,6 +186,21 @@ def test_the_key_stands_for_what_gdal_reads_beside_an_input(
         assert [Path(file).name for file in dataset.files] == ["b.tif", name]
     (after,) = calls_of(folders, ROW)
     assert after.key != before.key
+
+
+def test_a_folder_is_listed_once_for_all_rows(
+    folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed: list[Path] = []
+
+    def names_in(folder: Path) -> frozenset[str]:
+        listed.append(folder)
+        return input_files.names_in(folder)
+
+    monkeypatch.setattr(calls, "names_in", names_in)
+    found = calls_of(folders, *({**ROW, "output": f"{i}.tif"} for i in range(20)))
+    assert len({call.key for call in found}) == 20
+    assert listed == [folders[0]]
 
 
 def write_beside(path: Path) -> None:

@@ -86,8 +86,9 @@ def _read(tool: Tool, call: Call) -> Iterator[Path]:
     """Yield what a call reads: what its inputs name, and what that stands for."""
     for parameter in tool.parameters:
         value = call.values.get(parameter.name)
-        yield from (path for path in inputs_of(parameter.kind, value) if isinstance(path, Path))
-        yield from files_read(parameter.kind, value)
+        named = (path for path in inputs_of(parameter.kind, value) if isinstance(path, Path))
+        # Most names stand for themselves.
+        yield from dict.fromkeys((*named, *files_read(parameter.kind, value)))
 
 
 def _given(tool: Tool, call: Call) -> Iterator[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
 from ..raster_names import raster_name
 from ..rasters.atomic import make_folder
 from ..runs import digest
-from .input_files import facts_read
+from .input_files import Listed, facts_read, names_in
 
 # The column that is no parameter.
 NAME = "name"
@@ -79,19 +80,25 @@ def make_calls(
         if name not in known and name != NAME:
             raise ParameterError(f"the table has a column {name}, which {tool.name} does not know")
     width = len(str(len(rows)))
-    calls = []
+    calls, listed = [], cache(names_in)
     for number, row in enumerate(rows, 1):
         name = str(row.get(NAME, f"{number:0{width}}"))
         given = {"workers": threads, **row} if "workers" in known else row
         try:
-            calls.append(_call(tool, number, name, given, inputs, outputs))
+            calls.append(_call(tool, number, name, given, inputs, outputs, listed))
         except GroundTieError as error:
             calls.append(Call(number, name, problem=error.one_line()))
     return calls
 
 
 def _call(
-    tool: Tool, number: int, name: str, row: Mapping[str, Any], inputs: Path, outputs: Path
+    tool: Tool,
+    number: int,
+    name: str,
+    row: Mapping[str, Any],
+    inputs: Path,
+    outputs: Path,
+    listed: Listed,
 ) -> Call:
     values = {
         p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
@@ -106,7 +113,7 @@ def _call(
     written = {key: path for key, path in written.items() if path is not None}
     places = sorted((key, str(path)) for key, path in written.items())
     call = Call(number, name, checked, written)
-    read = facts_read(tool, checked, tuple(files_written(tool, call)))
+    read = facts_read(tool, checked, tuple(files_written(tool, call)), listed)
     return replace(call, key=digest(tool.run_of_call(checked), places, read))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,17 @@ from ..series.inputs import files_behind
 _BEHIND = (*SIDECARS, ".hdr")
 _IN_PLACE = (".wld", ".tab", ".rpb", "_rpc.txt", ".imd", ".hdr", ".prj", ".dbf", ".shx", ".cpg")
 
+# Returns the names of what lies in a folder.
+Listed = Callable[[Path], Collection[str]]
+
+
+def names_in(folder: Path) -> frozenset[str]:
+    """Return the names of what lies in a folder; none if it cannot be listed."""
+    try:
+        return frozenset(os.listdir(folder))
+    except OSError:
+        return frozenset()
+
 
 def files_read(kind: Kind, value: Any) -> Iterator[Path]:
     """Yield the files, or folders of one raster, that a parameter's checked value stands for."""
@@ -29,7 +40,7 @@ def files_read(kind: Kind, value: Any) -> Iterator[Path]:
 
 
 def facts_read(
-    tool: Tool, values: Mapping[str, Any], written: Collection[Path]
+    tool: Tool, values: Mapping[str, Any], written: Collection[Path], listed: Listed
 ) -> list[tuple[Any, ...]]:
     """Return place, size and time of all files that a call reads, as a key can hold them.
 
@@ -39,13 +50,15 @@ def facts_read(
         The call.
     written
         What it writes: this may lie beside what it reads, and is none of it.
+    listed
+        As `names_in`, which may keep what it has listed: calls read many files of few folders.
     """
     own = {os.path.abspath(path) for path in written}
     facts: list[tuple[Any, ...]] = []
     for parameter in tool.parameters:
         for path in files_read(parameter.kind, values[parameter.name]):
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
-            found = map(_facts, chain([path], inside, _beside(path)))
+            found = map(_facts, chain([path], inside, _beside(path, listed)))
             facts += [(parameter.name, *one) for one in found if one[0] not in own]
     return facts
 
@@ -61,14 +74,15 @@ def _facts(path: Path) -> tuple[Any, ...]:
     return (place,) if path.is_dir() else (place, status.st_size, status.st_mtime_ns)
 
 
-def _beside(path: Path) -> Iterator[Path]:
+def _beside(path: Path, listed: Listed) -> Iterator[Path]:
     """Yield what there is beside a file that belongs to it by its name."""
+    there = listed(path.parent)
     ending = path.suffix.lower()[1:]
     # World files: of .tif as .tfw and .tifw.
     world = (f".{ending[0]}{ending[-1]}w", f".{ending}w") if ending else ()
     endings = [(path.name, more) for more in _BEHIND]
     endings += [(path.stem, more) for more in (*world, *_IN_PLACE)]
     names = [stem + spelled for stem, more in endings for spelled in (more, more.upper())]
-    yield from (other for name in names if (other := path.with_name(name)).exists())
+    yield from (path.with_name(name) for name in names if name in there)
     if (mask := mask_beside(path)) is not None:
         yield mask[0]

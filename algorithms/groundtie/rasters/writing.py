@@ -34,8 +34,7 @@ _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", 
 _OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
 
 # GDAL takes floating-point numbers, of double precision, too, for the nodata value if they differ
-# from it by less than this share of it: `ARE_REAL_EQUAL` of its
-# gcore/gdal_priv.h.
+# from it by less than this share of it: `ARE_REAL_EQUAL` of its gcore/gdal_priv.h.
 _SAME_AS_NODATA = 4 * float(np.finfo(np.float32).eps)
 
 # Endings by which users ask for a Cloud Optimized GeoTIFF.
