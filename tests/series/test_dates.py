@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio.shutil
 from raster_files import utm_grid, write_raster
 from series_dates import FRAME
 from textured_pairs import texture
@@ -25,9 +26,9 @@ GRID = utm_grid(SIZE, SIZE)
 SETTINGS = Settings("auto", 3.0, None, None)
 
 
-def keys(folder: Path, context: Context) -> tuple[str, str, str]:
+def keys(folder: Path, context: Context, ending: str = ".tif") -> tuple[str, str, str]:
     """Return the keys of the second date, of its registration and of its registered raster."""
-    listed = [Listed(name, folder / f"{name}.tif", None) for name in "ab"]
+    listed = [Listed(name, folder / f"{name}{ending}", None) for name in "ab"]
     with ExitStack() as stack:
         (first, second), failures = open_dates(listed, None, stack, context)
         assert not failures
@@ -52,6 +53,21 @@ def test_georeferencing_that_a_sidecar_changes_is_another_date(
     crs, left = ("EPSG:32632", 500_030) if changed == "geotransform" else ("EPSG:32633", 500_000)
     sidecar(tmp_path / "b.tif", crs, left)
     after = keys(tmp_path, one_thread)
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def test_a_virtual_raster_of_another_source_is_another_date(
+    tmp_path: Path, one_thread: Context
+) -> None:
+    """The file itself stays as it is; statistics that a viewer leaves change nothing."""
+    write_raster(tmp_path / "source.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    for name in "ab":
+        rasterio.shutil.copy(tmp_path / "source.tif", tmp_path / f"{name}.vrt", driver="VRT")
+    before = keys(tmp_path, one_thread, ".vrt")
+    (tmp_path / "b.vrt.aux.xml").write_text("<PAMDataset/>")
+    assert keys(tmp_path, one_thread, ".vrt") == before
+    write_raster(tmp_path / "source.tif", texture(SIZE, SIZE)[::-1].astype(np.float32), GRID)
+    after = keys(tmp_path, one_thread, ".vrt")
     assert all(one != other for one, other in zip(before, after, strict=True))
 
 

@@ -214,6 +214,11 @@ class RasterSource:
             return native(self, window)
         return average_window(native, self, self, window, out_shape)
 
+    def files(self) -> list[str]:
+        """Return the names of the files that GDAL reads for it, those a virtual one is made of."""
+        with self._handles.borrow() as dataset:
+            return list(dataset.files)
+
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8] | None]:
         """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.
 

@@ -91,14 +91,20 @@ class Date:
             return True
         return variation2_of(self.image()) >= LEAST_VARIATION2
 
-    @property
+    @cached_property
     def facts(self) -> tuple[Any, ...]:
-        """What its pixels and their place come from; a sidecar may move them."""
-        return *file_facts(self.listed.raster), self.source.grid.to_json()
+        """What its pixels and their place come from: all files behind it, and its grid.
+
+        Programs that show a raster write statistics into its `.aux.xml`: of that the grid counts.
+        """
+        raster = self.listed.raster
+        behind = self.source.files() if isinstance(raster, Path) else []
+        files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
+        return *map(file_facts, files), self.source.grid.to_json()
 
     @cached_property
     def key(self) -> str:
-        """Stands for the file by name, size and time, for its georeferencing, and for the mask."""
+        """Stands for its files by name, size and time, for its georeferencing, and for the mask."""
         mask = self.listed.mask
         facts: list[Any] = [self.facts]
         facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
@@ -112,7 +118,7 @@ class Date:
         with_footprint
             Whether that is asked for, too; it takes all pixels.
         """
-        _ = self.is_radar, with_footprint and self.rings
+        _ = self.is_radar, self.facts, with_footprint and self.rings
 
     @cached_property
     def rings(self) -> list[FloatArray]:
