@@ -115,7 +115,7 @@ class Review:
     @cached_property
     def nominal_xy(self) -> FloatArray:
         """Nominal positions on the reference map, shape (n, 2)."""
-        return self.nominal.nominal_xy(self.points.input_px)
+        return self.points.nominal_xy(self.nominal)
 
     def input_px(self, nominal_xy: ArrayLike) -> FloatArray:
         """Return the input pixel (col, row) at a nominal position on the reference map."""

@@ -229,7 +229,7 @@ def judge(
         transform = Transform(model, pair.grid.crs, pair.input.source.grid)
         used = points.take(points.used)
         px = pair.grid.map_to_pixel(used.reference_xy)
-        nominal_px = pair.grid.map_to_pixel(transform.nominal_xy(used.input_px))
+        nominal_px = pair.grid.map_to_pixel(used.nominal_xy(transform))
         try:
             without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
             estimate = Estimate(transform, points, without_blocks)

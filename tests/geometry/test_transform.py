@@ -14,6 +14,7 @@ from rasterio.crs import CRS
 from groundtie.errors import TransformFileError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import KINDS
+from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 
@@ -71,6 +72,47 @@ def test_an_input_across_the_antimeridian_is_one() -> None:
     transform = Transform.nominal(CRS.from_epsg(32701), grid)
     px = grid.lattice()
     np.testing.assert_allclose(transform(transform.inverse(px)), px, atol=1e-3)
+
+
+class TestReferenceAcrossTheAntimeridian:
+    """Its map goes on beyond 180°, or beyond -180°; of UTM zone 1, PROJ has longitudes in ±180°."""
+
+    UTM1 = Grid(Affine(10, 0, 177_000, 0, -10, 8_118_000), CRS.from_epsg(32701), 800, 400)
+
+    def transform(self, turn: float) -> tuple[Transform, np.ndarray, np.ndarray]:
+        """Return one fitted to points on both sides, and their positions and pixels."""
+        xy = np.random.default_rng(0).uniform([-0.02, -17.02], [0.02, -16.98], (40, 2))
+        xy += [turn, 0]
+        nominal = xy + [2e-4, -1e-4] + 0.01 * (xy - [turn, -17.0])
+        lon = np.where(np.abs(nominal) > 180, nominal - 2 * turn, nominal)[:, 0]
+        px = self.UTM1.map_to_pixel(
+            reproject(np.column_stack([lon, nominal[:, 1]]), DEGREES.crs, self.UTM1.crs)
+        )
+        return Transform(fit_model("affine", xy, nominal), DEGREES.crs, self.UTM1), xy, px
+
+    @pytest.mark.parametrize("turn", [180.0, -180.0])
+    def test_pixels_are_where_the_reference_has_them(self, turn: float) -> None:
+        transform, xy, px = self.transform(turn)
+        np.testing.assert_allclose(transform(xy), px, atol=1e-3)
+        np.testing.assert_allclose(transform.inverse(px), xy, atol=1e-8)
+
+    def test_positions_of_other_maps_are_taken_there(self) -> None:
+        transform, xy, px = self.transform(180.0)
+        in_metres = reproject(xy, DEGREES.crs, self.UTM1.crs)
+        np.testing.assert_allclose(transform.of_map(self.UTM1.crs)(in_metres), px, atol=1e-3)
+
+    @pytest.mark.parametrize("turn", [180.0, -180.0])
+    def test_points_have_no_residuals_of_a_turn(self, turn: float) -> None:
+        transform, xy, px = self.transform(turn)
+        points = TiePoints.unmeasured(xy, px, None)
+        grid = Grid(Affine(1e-4, 0, turn - 0.03, 0, -1e-4, -16.97), DEGREES.crs, 600, 600)
+        assert np.abs(points.residual_on(grid, transform)).max() < 1e-3
+
+    def test_an_input_of_the_whole_earth_has_its_own_longitudes(self) -> None:
+        grid = Grid(Affine(1, 0, -180, 0, -1, 90), DEGREES.crs, 360, 180)
+        xy = np.random.default_rng(0).uniform(20, 40, (20, 2))
+        transform = Transform(fit_model("translation", xy, xy + [1, 0]), DEGREES.crs, grid)
+        np.testing.assert_allclose(transform.inverse([[2, 90]]), [[-178.5, -0.5]], atol=1e-6)
 
 
 def test_nominal_is_the_georeferencing() -> None:

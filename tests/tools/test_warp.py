@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+from affine import Affine
 from raster_files import UTM, utm_grid, wave_image, waves, write_raster
 from rasterio.crs import CRS
 from rasterio.warp import transform as to_crs
@@ -99,6 +100,20 @@ def error_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
         values = dataset.read(1)
         grid = Grid(dataset.transform, dataset.crs, dataset.width, dataset.height)
     return np.abs(values - wave_image(grid, LENGTH_M)), values
+
+
+def test_a_reference_in_degrees_across_the_antimeridian(tmp_path: Path) -> None:
+    """Its map goes on beyond 180°: so does the registered raster, which is as large as before."""
+    degrees, zone = CRS.from_epsg(4326), CRS.from_epsg(32701)
+    grid = Grid(Affine(10, 0, 180_000, 0, -10, 8_118_000), zone, 120, 100)
+    path = write_raster(tmp_path / "a.tif", wave_image(grid, LENGTH_M).astype(np.float32), grid)
+    xy = np.random.default_rng(0).uniform([179.99, -17.01], [180.01, -16.99], (20, 2))
+    transform = Transform(fit_model("affine", xy, xy + [1e-4, 0]), degrees, grid)
+    (tmp_path / "t.json").write_text(json.dumps(transform.to_json()))
+    made = warp(path, tmp_path / "out.tif", tmp_path / "t.json").grid
+    west, east = made.pixel_to_map(made.outline(1))[[0, 2], 0]
+    assert west < 180 < east
+    assert made.width == pytest.approx(120, abs=6)
 
 
 FILES = ("t.json", "t.gpkg", "t.geojson", "t.csv", "t.points")

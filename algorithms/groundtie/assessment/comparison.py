@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..errors import NoOverlapError
 from ..geometry.transform import Transform
 from ..raster_names import file_name
-from ..rasters.grid import FloatArray, PointFunction, reproject, require_both_or_none
+from ..rasters.grid import PointFunction, require_both_or_none
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
@@ -101,15 +101,11 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
     """
     grid = reference.grid
     require_both_or_none(grid.crs, transform.crs, f"{reference.path} and the transform")
-
-    def to_input_px(xy: FloatArray) -> FloatArray:
-        return transform(reproject(xy, grid.crs, transform.crs))
-
     footprint = transform.inverse(transform.input_grid.outline())
     try:
-        common = covering_grid(grid, reproject(footprint, transform.crs, grid.crs), within=True)
+        common = covering_grid(grid, grid.to_own_map(footprint, transform.crs), within=True)
     except NoOverlapError as error:
         raise NoOverlapError(f"{input.path}, as registered, misses {reference.path}") from error
     size = common.width, common.height
     pair = ImagePair(Image(reference), Image(input), common, size, common)
-    return Comparison.of(pair, to_input_px)
+    return Comparison.of(pair, transform.of_map(grid.crs))

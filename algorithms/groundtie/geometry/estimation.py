@@ -104,7 +104,7 @@ def fit_thin_plate(
     """
     used = points.take(points.used)
     px = grid.map_to_pixel(used.reference_xy)
-    nominal_px = grid.map_to_pixel(nominal.nominal_xy(used.input_px))
+    nominal_px = grid.map_to_pixel(used.nominal_xy(nominal))
     if len(used) < 4:
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2

@@ -41,7 +41,7 @@ def tie_point_columns(points: TiePoints, transform: Transform) -> dict[str, NDAr
     numbers = np.column_stack(
         [
             points.reference_xy,
-            transform.nominal_xy(points.input_px),
+            points.nominal_xy(transform),
             points.input_px,
             np.hypot(*residual.T),
             residual,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, at_longitudes_of
 from .transform import Transform
 
 USED = "used"
@@ -84,13 +84,21 @@ class TiePoints:
         """
         return self.check if self.states_fit or self.check.any() else self.used
 
+    def nominal_xy(self, transform: Transform) -> FloatArray:
+        """Return the nominal positions on the reference map, shape (n, 2), by a transform's input.
+
+        Across the antimeridian, longitudes go on as those of the points do.
+        """
+        nominal = transform.nominal_xy(self.input_px)
+        return at_longitudes_of(self.reference_xy, nominal, transform.crs)
+
     def residual_px(self, transform: Transform) -> FloatArray:
         """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""
         return np.asarray(self.input_px - transform(self.reference_xy))
 
     def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
         """Return nominal minus predicted positions in pixels of a grid on the map, (n, 2)."""
-        nominal = grid.map_to_pixel(transform.nominal_xy(self.input_px))
+        nominal = grid.map_to_pixel(self.nominal_xy(transform))
         return nominal - grid.map_to_pixel(transform.model(self.reference_xy))
 
     def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:

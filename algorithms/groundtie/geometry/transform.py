@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,11 @@ from ..rasters.grid import (
     FloatArray,
     Grid,
     PointFunction,
+    at_longitudes_of,
     crs_from_text,
     crs_to_text,
+    finite,
+    full_turn,
     is_invertible,
     reproject,
 )
@@ -67,7 +71,7 @@ class Transform:
 
     def of_map(self, crs: CRS | None) -> PointFunction:
         """Return the function from positions (n, 2) on a map of another CRS to input pixels."""
-        return lambda xy: self(reproject(xy, crs, self.crs))
+        return lambda xy: self(self._at_model(reproject(xy, crs, self.crs)))
 
     def nominal_xy(self, px: ArrayLike) -> FloatArray:
         """Return the nominal reference map positions of input pixels (col, row), (..., 2)."""
@@ -78,7 +82,28 @@ class Transform:
     def inverse(self, px: ArrayLike) -> FloatArray:
         """Return the reference map positions of input pixels (col, row), (..., 2)."""
         nominal = self.nominal_xy(px)
-        return self.model.inverse(nominal.reshape(-1, 2)).reshape(nominal.shape)
+        at_model = self._at_model(nominal.reshape(-1, 2))
+        return self.model.inverse(at_model).reshape(nominal.shape)
+
+    def _at_model(self, xy: FloatArray) -> FloatArray:
+        """Return positions of the reference map, (n, 2), with longitudes as the model has them."""
+        return xy if self._place is None else at_longitudes_of(self._place, xy, self.crs)
+
+    @cached_property
+    def _place(self) -> FloatArray | None:
+        """Where the model is on a map with longitudes, shape (1, 2).
+
+        None: it has no place, or the input takes up so much of the Earth that there is no other
+        side that its positions could be taken for.
+        """
+        turn, frame = full_turn(self.crs), self.model.frame
+        if turn is None or frame.to_map == Affine.identity():
+            return None
+        place = frame.leave(np.zeros((1, 2)))
+        outline = finite(self.nominal_xy(self.input_grid.outline()))
+        longitudes = at_longitudes_of(place, outline, self.crs)[:, 0]
+        is_on_one_side = len(longitudes) > 0 and np.ptp(longitudes) < turn / 2
+        return place if is_on_one_side else None
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""

@@ -14,7 +14,7 @@ from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, at_longitudes_of
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
@@ -184,7 +184,8 @@ def _patches(
 def _on_map(transform: Transform, level: Grid) -> Model:
     """Return a transform of degree 1 as a model from map positions to nominal ones."""
     xy = level.pixel_to_map(level.outline(4))
-    return fit_model("affine", xy, transform.nominal_xy(transform(xy)))
+    nominal = at_longitudes_of(xy, transform.nominal_xy(transform(xy)), transform.crs)
+    return fit_model("affine", xy, nominal)
 
 
 def _require_content(path: str, patch: Patch) -> None:

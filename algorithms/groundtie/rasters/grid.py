@@ -105,10 +105,9 @@ class Grid:
         Where the grid lies across the antimeridian, longitudes go on beyond it as the grid's do.
         """
         moved = reproject(xy, crs, self.crs)
-        if self._turn is None:
+        if not self._is_across_antimeridian:
             return moved
-        turns = np.rint((moved[:, :1] - self.pixel_to_map([self.centre_px])[0, 0]) / self._turn)
-        return moved - np.nan_to_num(turns, posinf=0, neginf=0) * [self._turn, 0]
+        return at_longitudes_of(self.pixel_to_map([self.centre_px]), moved, self.crs)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -149,15 +148,13 @@ class Grid:
         return factor, factor
 
     @cached_property
-    def _turn(self) -> float | None:
-        """A full turn of longitude in map units, if the grid lies across the antimeridian."""
-        if self.crs is None or not self.crs.is_geographic:
-            return None
-        turn = 360 / _degrees_per_unit(self.crs)
+    def _is_across_antimeridian(self) -> bool:
+        turn = full_turn(self.crs)
+        if turn is None:
+            return False
         longitudes = apply_affine(self.centre_transform, self.outline(1))[:, 0]
         # Of the whole Earth there is no other side that positions could be taken for.
-        is_across = np.abs(longitudes).max() > turn / 2 and np.ptp(longitudes) < turn / 2
-        return turn if is_across else None
+        return bool(np.abs(longitudes).max() > turn / 2 and np.ptp(longitudes) < turn / 2)
 
     @cached_property
     def pixel_size_m(self) -> float:
@@ -302,6 +299,35 @@ def require_map(crs: CRS | None) -> CRS | None:
         f"a CRS is neither projected nor geographic ({text[:40]}…); give it the CRS of its "
         "map, or none (gdal_edit.py -a_srs)"
     )
+
+
+def full_turn(crs: CRS | None) -> float | None:
+    """Return a full turn of longitude in map units; None: the map has no longitudes."""
+    if crs is None or not crs.is_geographic:
+        return None
+    return 360 / _degrees_per_unit(crs)
+
+
+def at_longitudes_of(places: FloatArray, xy: FloatArray, crs: CRS | None) -> FloatArray:
+    """Return positions of a map, shape (n, 2), not more than half a turn from others.
+
+    Parameters
+    ----------
+    places
+        The others, shape (n, 2), or one for all, (1, 2): of the ways to count a longitude, which
+        differ by full turns, positions get the one of these.
+    xy
+        The positions; of a map without longitudes they stay as they are.
+    crs
+        CRS of both.
+    """
+    turn = full_turn(crs)
+    if turn is None:
+        return xy
+    # Positions outside of a projection's domain are infinite.
+    with np.errstate(invalid="ignore"):
+        turns = np.rint((xy[:, :1] - places[:, :1]) / turn)
+    return xy - np.nan_to_num(turns, posinf=0, neginf=0) * [turn, 0]
 
 
 def _degrees_per_unit(crs: CRS) -> float:

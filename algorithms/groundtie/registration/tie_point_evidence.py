@@ -200,8 +200,7 @@ class TiePointEvidence:
 
     @cached_property
     def _nominal_xy(self) -> FloatArray:
-        nominal = Transform.nominal(self.points.crs, self.input_grid)
-        return nominal.nominal_xy(self.points.input_px)
+        return self.points.nominal_xy(Transform.nominal(self.points.crs, self.input_grid))
 
     def _fitted(self, kind: str) -> Transform:
         """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""

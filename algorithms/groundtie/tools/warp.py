@@ -15,7 +15,7 @@ from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid, reproject, require_both_or_none
+from ..rasters.grid import Grid, require_both_or_none
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.vrt import SUFFIX as VRT
@@ -104,7 +104,7 @@ def warp(
                 return WarpResult(output, target, found, fit)
             warp_raster(
                 source,
-                lambda xy: found(reproject(xy, target.crs, found.crs)),
+                found.of_map(target.crs),
                 target,
                 outputs.stage(output),
                 resampling,
