@@ -4,7 +4,8 @@ Tools are functions (`coregister`, `warp`, `simulate`, …) of files, arrays (`R
 datasets; see `groundtie.tools`. `load_transform` reads the transform that a registration wrote.
 
 What is decided on the way, and why, goes to `logging` under this package's name: steps at level
-INFO, rejected tie points at DEBUG. Without a handler of the caller's it goes nowhere.
+INFO, rejected tie points at DEBUG, what is written beyond the overlap at WARNING. Without a
+handler of the caller's it goes nowhere.
 """
 
 from __future__ import annotations

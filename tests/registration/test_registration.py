@@ -80,6 +80,37 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[3]
 
 
+@pytest.mark.parametrize(
+    ("name", "grid", "is_stated"),
+    [
+        (None, "reference", False),
+        (None, "input", True),
+        ("o.tif", "input", True),
+        ("o.vrt", "reference", True),
+    ],
+)
+def test_what_is_warped_beyond_the_overlap_is_stated(
+    registration: Registration,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    name: str | None,
+    grid: str,
+    is_stated: bool,
+) -> None:
+    """Of the matching grid, the left half is taken for all that the images share."""
+    evidence = registration.evidence
+    assert evidence is not None
+    half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)
+    wide = replace(registration, evidence=replace(evidence, grid=half))
+    wide.warp(output=None if name is None else tmp_path / name, grid=grid)
+    stated = [line for line in caplog.messages if "outside of the overlap" in line]
+    assert len(stated) == is_stated
+    beyond = wide.beyond_overlap(grid)
+    assert (beyond is not None) == (grid == "input")
+    if beyond is not None:
+        assert beyond.share == pytest.approx(0.5, abs=0.1)
+
+
 def test_what_was_tried_before_stands_after_the_correction(registration: Registration) -> None:
     found = replace(registration, tried=("tried chips: refused",))
     assert found.lines()[0].startswith("correction: ")

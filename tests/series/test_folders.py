@@ -68,6 +68,23 @@ def test_a_further_date_does_not_change_the_frame(tmp_path: Path) -> None:
     assert frame_of(out) == before and found.reused_pairs > 0
 
 
+@pytest.mark.parametrize(("grid", "share"), [("reference", None), ("input", 0.5)])
+def test_what_is_written_beyond_the_overlap_is_stated(
+    tmp_path: Path, grid: str, share: float | None
+) -> None:
+    """The second date lies half a width farther to the east."""
+    dates = dates_at(tmp_path / "dates", UTM, 500_000, "a")
+    dates_at(dates, UTM, 500_000 + 5 * SIZE, "b")
+    files = tmp_path / "out", [dates], dates / "a.tif", tmp_path / "r.html"
+    found = coregister_series(*files[:2], reference=files[2], report=files[3], output_grid=grid)
+    reference, registered = found.rows()
+    assert reference["outside_of_overlap"] is None
+    assert registered["outside_of_overlap"] == pytest.approx(share, abs=0.01)
+    stated = [line for line in found.lines() if "outside of the overlap" in line]
+    assert [("50%" in line, "(b)" in line) for line in stated] == [(True, True)] * bool(share)
+    assert ("outside of the overlap" in files[3].read_text()) == bool(share)
+
+
 def refuse(task: PairTask, *_: Any) -> PairResult:
     """Refuse a pair."""
     key = pair_key(task.first, task.second, task.settings, task.frame)

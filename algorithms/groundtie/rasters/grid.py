@@ -115,6 +115,10 @@ class Grid:
         size = np.array([self.width, self.height])
         return np.asarray(np.all((px >= -0.5) & (px <= size - 0.5), axis=-1))
 
+    def covers(self, xy: ArrayLike) -> NDArray[np.bool_]:
+        """Return for each position on the map, shape (n, 2), whether a pixel lies there."""
+        return self.contains(self.map_to_pixel(xy))
+
     @cached_property
     def is_georeferenced(self) -> bool:
         """Whether map positions are more than pixel coordinates."""

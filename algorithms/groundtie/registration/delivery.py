@@ -21,12 +21,9 @@ from .asked import USUAL, asked_masks, specified
 from .displacement import write_displacement
 from .opening import OpenPair, open_pair, pair_images
 from .pipeline import run
-from .registered_output import REFERENCE_GRID, BeyondOverlap, RegisteredOutput, grid_of_output
+from .registered_output import BeyondOverlap, RegisteredOutput, grid_of_output
 from .registration import Registration
 from .specification import Specification
-
-# Less than this share outside of the overlap is not worth a line: it would be 0 %.
-_LEAST_BEYOND = 0.005
 
 
 @dataclass(frozen=True)
@@ -52,13 +49,10 @@ class RegistrationFiles:
 
     def beyond(self, registration: Registration) -> BeyondOverlap | None:
         """Return what of the written image lies outside of the overlap; None: nothing, or none."""
-        output, evidence = self.output, registration.evidence
-        if output is None or evidence is None or not registration.verdict.accepted:
+        output = self.output
+        if output is None or not registration.verdict.accepted:
             return None
-        if grid_of_output(output.path, output.grid) == REFERENCE_GRID:
-            return None
-        found = BeyondOverlap.of(registration.accepted(), evidence.grid)
-        return found if found.share >= _LEAST_BEYOND else None
+        return registration.beyond_overlap(grid_of_output(output.path, output.grid))
 
     def write(self, registration: Registration, context: Context) -> None:
         """Write all files, or those of a refused registration: the report."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import ParameterError
@@ -23,8 +25,14 @@ from ..rasters.vrt import write_vrt
 REFERENCE_GRID, UNTOUCHED = "reference", "untouched"
 OUTPUT_GRIDS = (REFERENCE_GRID, "input", UNTOUCHED)
 
+# Returns which of some positions on the reference's map, (n, 2), lie where a transform was checked.
+IsChecked = Callable[[FloatArray], NDArray[np.bool_]]
+
 # Models that bend ever more where no point holds them.
 _BENDING = ("polynomial2", "polynomial3", "tps")
+
+# Less than this share outside of the overlap is not worth a line: it would be 0 %.
+_LEAST_BEYOND = 0.005
 
 # Places a side of a raster at which its share in the overlap is found.
 _PLACES = 101
@@ -106,11 +114,18 @@ class BeyondOverlap:
     model: str
 
     @classmethod
-    def of(cls, transform: Transform, overlap: Grid) -> BeyondOverlap:
-        """Return what of a transform's raster lies beyond a grid on the reference's map."""
+    def of(cls, transform: Transform, is_checked: IsChecked) -> BeyondOverlap:
+        """Return what of a transform's raster lies beyond where it was checked."""
         xy = transform.inverse(transform.input_grid.lattice(_PLACES))
-        inside = overlap.contains(overlap.map_to_pixel(xy))
-        return cls(1 - float(inside.mean()), transform.model.kind)
+        return cls(1 - float(is_checked(xy).mean()), transform.model.kind)
+
+    @classmethod
+    def on(cls, grid: str, transform: Transform, is_checked: IsChecked) -> BeyondOverlap | None:
+        """Return as `of` what is written beyond, onto one of `OUTPUT_GRIDS`; None: nothing."""
+        if grid == REFERENCE_GRID:
+            return None
+        found = cls.of(transform, is_checked)
+        return found if found.share >= _LEAST_BEYOND else None
 
     @property
     def bends(self) -> bool:

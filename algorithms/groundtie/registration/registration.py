@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -29,11 +30,13 @@ from ..report.details import extremes
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
-from .registered_output import BeyondOverlap, RegisteredOutput, resampled_onto
+from .registered_output import BeyondOverlap, RegisteredOutput, grid_of_output, resampled_onto
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
 from .verdict import NOT_JUDGED, Verdict, both_units
+
+_LOG = logging.getLogger(__name__)
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
@@ -128,6 +131,8 @@ class Registration:
     ) -> Raster | None:
         """Resample a raster by the transform, once.
 
+        What of it lies beyond the overlap is logged as a warning (see `beyond_overlap`).
+
         Parameters
         ----------
         raster
@@ -154,13 +159,32 @@ class Registration:
             if raster is not None:
                 source = stack.enter_context(open_raster(raster))
                 transform = transform_of(transform, source, "the registration")
-            if output is not None:
+            path = None if output is None else Path(output)
+            beyond = self.beyond_overlap(grid_of_output(path, grid), transform)
+            if beyond is not None:
+                _LOG.warning(beyond.line())
+            if path is not None:
                 with Outputs() as outputs:
-                    made = RegisteredOutput(Path(output), grid, resampling)
+                    made = RegisteredOutput(path, grid, resampling)
                     made.write(source, reference, transform, outputs, context)
                 return None
             to_px, target = resampled_onto(grid, source, reference, transform)
             return warp_to_array(source, to_px, target, resampling, workers=context.workers)
+
+    def beyond_overlap(self, grid: str, transform: Transform | None = None) -> BeyondOverlap | None:
+        """Return what of a registered raster lies where nothing has checked the transform.
+
+        None: nothing of it, as on the reference's grid.
+
+        Parameters
+        ----------
+        grid
+            One of `registered_output.OUTPUT_GRIDS`.
+        transform
+            That of the raster; None: of the input.
+        """
+        assert self.evidence is not None
+        return BeyondOverlap.on(grid, transform or self.accepted(), self.evidence.grid.covers)
 
     def report(self, path: Path | str) -> None:
         """Write the report, an HTML page, and its numbers beside it as JSON.

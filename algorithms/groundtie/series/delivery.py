@@ -89,7 +89,10 @@ class SeriesFiles:
         for number, one in enumerate(series.dates):
             part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
             if one.is_registered:
-                one, written[one.name], grid = self._with_raster(one, series, stored, outputs, part)
+                one, known, grid = self._with_raster(one, series, stored, outputs, part)
+                beyond = series.beyond_overlap(one, self.output_grid)
+                share = None if beyond is None else beyond.share
+                written[one.name] = {**known, "outside_of_overlap": share}
                 items.append(self._item(one, series, written[one.name]["file"], grid))
             dates.append(one)
         files = {"output_folder": self.folder}

@@ -65,6 +65,7 @@ class SeriesReport(Page):
             "left_out": [row for row in rows if row["state"] == "left out"],
             "count": len(series.registered) + len(series.left_out),
             "loops": series.loops(),
+            "beyond": series.beyond_line(),
             "rejected": [
                 " – ".join(series.names[k] for k in ends) for ends in series.settled.rejected
             ],

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..declaration import file_lines, given_files
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid
+from ..registration.registered_output import BeyondOverlap
 from ..report.page import made, plain
 from .dates import Date
-from .frame import SeriesFrame, rms_px, sigma_px
+from .frame import FloatArray, SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
 from .pairs import PairResult
 from .settling import DateVerdict, Settled
@@ -38,6 +40,7 @@ TABLE_COLUMNS = {
     "open_loops": "int",
     "worst_loop_px": "float",
     "confirmed": "bool",
+    "outside_of_overlap": "float",
 }
 
 
@@ -75,8 +78,16 @@ class SeriesDate:
         """Whether it was registered: it is neither left out, nor the reference, nor alone."""
         return self.verdict.accepted and not self.is_reference and self.verdict.evidence.links > 0
 
-    def row(self, frame: SeriesFrame, file: str | None) -> dict[str, Any]:
-        """Return the date's row of the table; shifts are where its ground nominally lies."""
+    def row(self, frame: SeriesFrame, written: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the date's row of the table; shifts are where its ground nominally lies.
+
+        Parameters
+        ----------
+        frame
+            The series' frame.
+        written
+            What is known of its raster (see `Series.written`); empty: there is none.
+        """
         verdict, evidence = self.verdict, self.verdict.evidence
         values: dict[str, Any] = dict.fromkeys(TABLE_COLUMNS)
         state = "registered" if verdict.accepted else "left out"
@@ -86,12 +97,13 @@ class SeriesDate:
             "state": "reference" if self.is_reference else state,
             "rule": verdict.rule,
             "reason": "all dates are registered to it" if self.is_reference else verdict.reason,
-            "file": file,
+            "file": written.get("file"),
             "links": evidence.links,
             "loops": evidence.loops,
             "open_loops": evidence.open_loops,
             "worst_loop_px": verdict.worst_loop_px,
             "confirmed": evidence.is_confirmed,
+            "outside_of_overlap": written.get("outside_of_overlap"),
         }
         displacement, covariance = verdict.displacement, verdict.covariance
         if displacement is None or covariance is None:
@@ -176,8 +188,51 @@ class Series:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table, one row a date (see `TABLE_COLUMNS`)."""
-        files = {name: written["file"] for name, written in self.written.items()}
-        return [date.row(self.frame, files.get(date.name)) for date in self.dates]
+        return [date.row(self.frame, self.written.get(date.name, {})) for date in self.dates]
+
+    def beyond_overlap(self, date: SeriesDate, grid: str) -> BeyondOverlap | None:
+        """Return what of a registered date lies where no date is that it was registered with.
+
+        None: nothing of it, as on the series' grid.
+
+        Parameters
+        ----------
+        date
+            The date.
+        grid
+            One of `registered_output.OUTPUT_GRIDS`.
+        """
+        assert date.transform is not None
+        transforms, rejected = self.transforms(), {frozenset(one) for one in self._rejected}
+        linked = {
+            name
+            for pair in self.pairs
+            if pair.accepted and frozenset((pair.first, pair.second)) not in rejected
+            for name in (pair.first, pair.second)
+            if date.name in (pair.first, pair.second) and name != date.name
+        }
+        others = [transforms[name] for name in linked & transforms.keys()]
+
+        def is_checked(xy: FloatArray) -> NDArray[np.bool_]:
+            seen = [one.input_grid.contains(one(xy)) for one in others]
+            return np.any(seen, axis=0)
+
+        return BeyondOverlap.on(grid, date.transform, is_checked)
+
+    def beyond_line(self) -> str:
+        """Return what of the dates nothing has checked as a line of text; empty: nothing."""
+        shares = {name: one["outside_of_overlap"] or 0.0 for name, one in self.written.items()}
+        name = max(shares, key=lambda name: shares[name], default="")
+        if not shares.get(name):
+            return ""
+        return (
+            f"outside of the overlap with other dates: up to {shares[name]:.0%} of a registered "
+            f"image ({name}), where nothing has checked the transform"
+        )
+
+    @property
+    def _rejected(self) -> list[list[str]]:
+        return [[self.names[k] for k in ends] for ends in self.settled.rejected]
 
     def loops(self) -> dict[str, Any]:
         """Return how well triplets of dates close."""
@@ -201,7 +256,6 @@ class Series:
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        rejected = [[self.names[k] for k in ends] for ends in self.settled.rejected]
         values = {
             "verdict": {
                 "accepted": bool(self.registered),
@@ -211,7 +265,7 @@ class Series:
             "datum": self.datum,
             "dates": self.rows(),
             "loops": self.loops(),
-            "rejected_pairs": rejected,
+            "rejected_pairs": self._rejected,
             "registered_pairs": self.registered_pairs,
             "reused_pairs": self.reused_pairs,
             **made(self.parameters, self.seconds),
@@ -260,6 +314,8 @@ class Series:
                 f"loops that close: {loops['closed']} of {loops['count']}; error "
                 f"{loops['median_px']:.2f} px (median), {loops['largest_px']:.2f} px (largest)"
             )
+        if beyond := self.beyond_line():
+            lines.append(beyond)
         reused = f", {self.reused_pairs} taken over" if self.reused_pairs else ""
         lines.append(f"registrations of two dates: {self.registered_pairs} done{reused}")
         return lines + file_lines(self.files)
