@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from raster_files import write_raster
 from rpc_models import camera_rpc
 from toys import TOY
@@ -186,6 +187,24 @@ def test_the_key_stands_for_what_gdal_reads_beside_an_input(
         assert [Path(file).name for file in dataset.files] == ["b.tif", name]
     (after,) = calls_of(folders, ROW)
     assert after.key != before.key
+
+
+@pytest.mark.parametrize("is_nested", [False, True])
+def test_the_key_stands_for_what_a_virtual_input_is_made_of(
+    folders: tuple[Path, Path], is_nested: bool
+) -> None:
+    source, path = folders[0] / "source.tif", folders[0] / "b.vrt"
+    write_raster(source, np.ones((9, 9), np.uint8))
+    rasterio.shutil.copy(source, path, driver="VRT")
+    if is_nested:
+        inner = path.rename(folders[0] / "inner.vrt")
+        path.write_text(inner.read_text().replace(source.name, inner.name))
+    row = {**ROW, "input": "b.vrt"}
+    (before,) = calls_of(folders, row)
+    assert calls_of(folders, row)[0].key == before.key
+    write_raster(folders[0] / "source.tif", np.full((9, 9), 2, np.uint8))
+    (after,) = calls_of(folders, row)
+    assert after.key != before.key and not after.problem
 
 
 def test_a_folder_is_listed_once_for_all_rows(

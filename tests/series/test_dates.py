@@ -56,13 +56,18 @@ def test_georeferencing_that_a_sidecar_changes_is_another_date(
     assert all(one != other for one, other in zip(before, after, strict=True))
 
 
+@pytest.mark.parametrize("is_nested", [False, True])
 def test_a_virtual_raster_of_another_source_is_another_date(
-    tmp_path: Path, one_thread: Context
+    tmp_path: Path, one_thread: Context, is_nested: bool
 ) -> None:
     """The file itself stays as it is; statistics that a viewer leaves change nothing."""
     write_raster(tmp_path / "source.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
     for name in "ab":
-        rasterio.shutil.copy(tmp_path / "source.tif", tmp_path / f"{name}.vrt", driver="VRT")
+        path = tmp_path / f"{name}.vrt"
+        rasterio.shutil.copy(tmp_path / "source.tif", path, driver="VRT")
+        if is_nested:
+            inner = path.rename(tmp_path / f"inner_{name}.vrt")
+            path.write_text(inner.read_text().replace("source.tif", inner.name))
     before = keys(tmp_path, one_thread, ".vrt")
     (tmp_path / "b.vrt.aux.xml").write_text("<PAMDataset/>")
     assert keys(tmp_path, one_thread, ".vrt") == before

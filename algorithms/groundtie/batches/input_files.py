@@ -13,6 +13,7 @@ from ..declaration import Tool
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..rasters.atomic import SIDECARS
+from ..rasters.vrt import sources_of
 from ..series.inputs import files_behind
 
 # What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
@@ -58,7 +59,7 @@ def facts_read(
     for parameter in tool.parameters:
         for path in files_read(parameter.kind, values[parameter.name]):
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
-            found = map(_facts, chain([path], inside, _beside(path, listed)))
+            found = map(_facts, chain([path], inside, _beside(path, listed), sources_of(path)))
             facts += [(parameter.name, *one) for one in found if one[0] not in own]
     return facts
 

@@ -26,6 +26,7 @@ from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
+from ..rasters.vrt import sources_of
 from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
 from ..runs import digest
@@ -98,7 +99,9 @@ class Date:
         Programs that show a raster write statistics into its `.aux.xml`: of that the grid counts.
         """
         raster = self.listed.raster
-        behind = self.source.files() if isinstance(raster, Path) else []
+        behind: list[str] = []
+        if isinstance(raster, Path):
+            behind = [*self.source.files(), *map(str, sources_of(raster))]
         files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
         return *map(file_facts, files), self.source.grid.to_json()
 
