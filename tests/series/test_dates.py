@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import ExitStack
 from pathlib import Path
 
+import fiona
 import numpy as np
 import pytest
 import rasterio.shutil
 from raster_files import utm_grid, write_raster
 from series_dates import FRAME
+from shapely.geometry import box, mapping
 from textured_pairs import texture
 
 from groundtie.context import Context
+from groundtie.registration.user_masks import UserMask
 from groundtie.series import dates
 from groundtie.series.dates import open_dates
 from groundtie.series.delivery import SeriesFiles
@@ -92,6 +96,52 @@ def test_a_truncated_date_is_left_out_alone_whether_held_or_not(
         assert [date.name for date in found] == ["a", "c"]
         assert [date.footprint(GRID.crs).area for date in found] == [(10.0 * SIZE) ** 2] * 2
     assert failures.keys() == {"b"} and "b.tif" in failures["b"]
+
+
+def test_a_mask_that_a_sidecar_moves_makes_another_date(
+    tmp_path: Path, one_thread: Context
+) -> None:
+    """Statistics that a viewer leaves beside it change nothing."""
+    path = write_raster(tmp_path / "a.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    mask = write_raster(tmp_path / "mask.tif", np.ones((SIZE, SIZE), np.uint8))
+
+    def key() -> str:
+        with ExitStack() as stack:
+            listed = Listed("a", path, None, UserMask(mask))
+            (date,), failures = open_dates([listed], None, stack, one_thread)
+            assert not failures
+            return date.key
+
+    sidecar(mask, "EPSG:32632", 500_000)
+    before = key()
+    aux = mask.with_name("mask.tif.aux.xml")
+    aux.write_text(aux.read_text().replace("</PAM", "<Metadata/></PAM"))
+    assert key() == before
+    sidecar(mask, "EPSG:32632", 500_030)
+    assert key() != before
+
+
+@pytest.mark.parametrize("ending", [".shp", ".shx", ".prj"])
+def test_a_shapefile_of_a_mask_has_several_files(
+    tmp_path: Path, one_thread: Context, ending: str
+) -> None:
+    path = write_raster(tmp_path / "a.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    layer = tmp_path / "mask.shp"
+    shape = mapping(box(500_000, 4_999_900, 500_100, 5_000_000))
+    schema = {"geometry": "Polygon", "properties": {}}
+    with fiona.open(layer, "w", "ESRI Shapefile", schema, crs="EPSG:32632") as file:
+        file.write({"geometry": shape, "properties": {}})
+
+    def key() -> str:
+        with ExitStack() as stack:
+            listed = Listed("a", path, None, UserMask(layer, "inside"))
+            (date,), failures = open_dates([listed], None, stack, one_thread)
+            assert not failures
+            return date.key
+
+    before = key()
+    os.utime(layer.with_suffix(ending), (1e9, 1e9))
+    assert key() != before
 
 
 def sidecar(path: Path, crs: str, left: int) -> None:

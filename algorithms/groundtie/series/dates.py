@@ -36,6 +36,9 @@ from .inputs import Listed
 # Footprints are drawn on images reduced to this, on their longer side.
 _FOOTPRINT_PX = 256
 
+# What states the place of a shapefile's shapes, and where they are in it.
+_PARTS_OF_SHAPEFILE = (".shx", ".prj")
+
 
 @dataclass(frozen=True)
 class Date:
@@ -94,24 +97,24 @@ class Date:
 
     @cached_property
     def facts(self) -> tuple[Any, ...]:
-        """What its pixels and their place come from: all files behind it, and its grid.
+        """What its pixels and their place come from: all files behind it, and its grid."""
+        return raster_facts(self.listed.raster, self.source)
 
-        Programs that show a raster write statistics into its `.aux.xml`: of that the grid counts.
-        """
-        raster = self.listed.raster
-        behind: list[str] = []
-        if isinstance(raster, Path):
-            behind = [*self.source.files(), *map(str, sources_of(raster))]
-        files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
-        return *map(file_facts, files), self.source.grid.to_json()
+    @cached_property
+    def mask_facts(self) -> tuple[Any, ...]:
+        """What its mask and the mask's place come from, as `facts`."""
+        mask = self.listed.mask
+        if mask is None:
+            return (file_facts(None),)
+        if mask.is_raster:
+            with open_raster(mask.mask) as source:
+                return raster_facts(mask.mask, source), mask.values
+        return *map(file_facts, parts_of_layer(mask.mask)), mask.values
 
     @cached_property
     def key(self) -> str:
         """Stands for its files by name, size and time, for its georeferencing, and for the mask."""
-        mask = self.listed.mask
-        facts: list[Any] = [self.facts]
-        facts += [file_facts(None)] if mask is None else [file_facts(mask.mask), mask.values]
-        return digest(*facts)
+        return digest(self.facts, *self.mask_facts)
 
     def read(self, with_footprint: bool) -> None:
         """Read what the series asks of the date, so that what fails is the date and not the series.
@@ -121,7 +124,7 @@ class Date:
         with_footprint
             Whether that is asked for, too; it takes all pixels.
         """
-        _ = self.is_radar, self.facts, with_footprint and self.rings
+        _ = self.is_radar, self.facts, self.mask_facts, with_footprint and self.rings
 
     @cached_property
     def rings(self) -> list[FloatArray]:
@@ -208,6 +211,30 @@ def footprint_shares(polygons: Sequence[Any]) -> dict[frozenset[int], float]:
         if common > 0:
             found[frozenset((first, second))] = float(common / min(one.area, other.area))
     return found
+
+
+def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
+    """Return what a raster's pixels and their place come from: all files behind it, and its grid.
+
+    Programs that show a raster write statistics into its `.aux.xml`: of that the grid counts.
+
+    Parameters
+    ----------
+    raster, source
+        As it was named, and open.
+    """
+    behind: list[str] = []
+    if isinstance(raster, Path):
+        behind = [*source.files(), *map(str, sources_of(raster))]
+    files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
+    return *map(file_facts, files), source.grid.to_json()
+
+
+def parts_of_layer(layer: Any) -> list[Any]:
+    """Return the files of a vector layer or a classifier: a shapefile's are several."""
+    if not isinstance(layer, Path) or layer.suffix.lower() != ".shp":
+        return [layer]
+    return [layer, *(layer.with_suffix(ending) for ending in _PARTS_OF_SHAPEFILE)]
 
 
 def file_facts(path: Path | str | None) -> tuple[Any, ...]:
