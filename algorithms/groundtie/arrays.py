@@ -74,6 +74,8 @@ class Raster:
     def from_xarray(cls, array: Any) -> Raster:
         """Return an `xarray.DataArray` that rioxarray locates (extra `xarray`) as a raster.
 
+        One that has a CRS, but neither coordinates nor a transform, is in pixel coordinates.
+
         Raises
         ------
         ParameterError
@@ -93,12 +95,11 @@ class Raster:
         others = [dim for dim in array.dims if dim not in (across, down)]
         if len(others) > 1:
             raise ParameterError(f"an array has bands, y and x, not {', '.join(map(str, others))}")
-        return cls(
-            array.transpose(*others, down, across).values,
-            _transform_of(array),
-            None if located.crs is None else CRS.from_wkt(located.crs.to_wkt()),
-            located.nodata,
-        )
+        transform = _transform_of(array)
+        # As of files: without a transform, a CRS locates nothing.
+        crs = None if transform is None or located.crs is None else located.crs.to_wkt()
+        values = array.transpose(*others, down, across).values
+        return cls(values, transform, crs, located.nodata)
 
     def to_xarray(self) -> Any:
         """Return this raster as an `xarray.DataArray` (extra `xarray`) of (band, y, x) or (y, x).
@@ -209,7 +210,8 @@ def _transform_of(array: Any) -> Affine | None:
     located = array.rio
     stored = located.transform()
     if located.x_dim not in array.coords or located.y_dim not in array.coords:
-        return stored if located.crs is not None else None
+        # rioxarray has the identity for none.
+        return None if stored.is_identity or located.crs is None else stored
     # The stored one is exact, but that of the whole where the array is a part: coordinates
     # show which.
     found = located.transform(recalc=True)

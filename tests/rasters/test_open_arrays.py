@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -213,6 +215,11 @@ class TestXarray:
         np.testing.assert_allclose(part.transform[:6], moved[:6], atol=1e-6)
         assert (part.values.shape, part.crs, part.nodata) == ((16, 20), UTM, 7)
 
+    def test_without_coordinates_a_crs_locates_nothing(self, opened: Any, tmp_path: Path) -> None:
+        bare = opened[1].drop_vars(["x", "y", "spatial_ref"]).rio.write_crs(UTM)
+        path = write_raster(tmp_path / "bare.tif", opened[1].values, crs=UTM, nodata=7)
+        assert_read_alike(bare, path)
+
     def test_to_xarray_and_back(self, opened: Any) -> None:
         raster = Raster.from_xarray(opened[1])
         assert raster.transform == GRID.transform
@@ -230,6 +237,28 @@ class TestXarray:
             Raster.from_xarray(xarray.DataArray(np.zeros((2, 3)), dims=("a", "b")))
         with pytest.raises(ParameterError, match="has bands, y and x, not time, band"):
             Raster.from_xarray(opened[1].expand_dims("time"))
+
+
+@pytest.mark.parametrize(
+    ("stored", "transform", "crs"),
+    [(Affine.identity(), None, None), (GRID.transform, GRID.transform, UTM)],
+)
+def test_an_array_with_a_crs_and_no_coordinates(
+    monkeypatch: pytest.MonkeyPatch, stored: Affine, transform: Affine | None, crs: Any
+) -> None:
+    """Also where rioxarray is not installed: it has the identity where no transform is stored."""
+    located = SimpleNamespace(x_dim="x", y_dim="y", crs=UTM, nodata=7, transform=lambda: stored)
+    values = np.zeros((2, 3))
+    bare = SimpleNamespace(
+        dims=("y", "x"), coords={}, rio=located, transpose=lambda *_: SimpleNamespace(values=values)
+    )
+    exceptions = SimpleNamespace(RioXarrayError=KeyError)
+    monkeypatch.setitem(sys.modules, "rioxarray", SimpleNamespace(exceptions=exceptions))
+    monkeypatch.setitem(sys.modules, "rioxarray.exceptions", exceptions)
+    raster = Raster.from_xarray(bare)
+    assert (raster.transform, raster.crs, raster.nodata) == (transform, crs, 7)
+    with open_raster(bare) as source:
+        assert source.grid.is_georeferenced == (transform is not None)
 
 
 def test_an_array_without_rioxarray_is_explained() -> None:
