@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.shutil
+from affine import Affine
 from rasterio.control import GroundControlPoint
 from rasterio.crs import CRS
 from rpc_models import camera_rpc, write_dem, write_positions
@@ -79,6 +80,28 @@ def test_the_georeferencers_points_get_the_grounds_height(
     np.testing.assert_allclose(found.points.covariance_px2, [np.eye(2)] * len(points))
     # It knows no check points: they are switched off.
     assert found.points.used.tolist() == (points.points.used & ~points.points.is_check).tolist()
+
+
+def test_the_georeferencer_has_an_images_own_geotransform(
+    tmp_path: Path, located: tuple[Orientation, Grid]
+) -> None:
+    """Where it shows an image that has one besides RPCs: source positions are on that map."""
+    orientation, grid = located
+    nominal = Grid(Affine(0.5, 0, 10, 0, -0.5, 50), CRS.from_epsg(4326), grid.width, grid.height)
+    points = some_points(orientation)
+    points.write(tmp_path / "a.points", orientation, nominal)
+    _, *lines = (tmp_path / "a.points").read_text().splitlines()
+    source_x, source_y = np.loadtxt(lines[1:], delimiter=",")[:, 2:4].T
+    col, row = points.points.input_px.T
+    np.testing.assert_allclose(source_x, 10 + 0.5 * (col + 0.5), atol=1e-6)
+    np.testing.assert_allclose(source_y, 50 - 0.5 * (row + 0.5), atol=1e-6)
+    found = read_control_points(tmp_path / "a.points", orientation, nominal)
+    np.testing.assert_allclose(found.points.input_px, points.points.input_px, atol=1e-6)
+    # Without a CRS of its own, the file's map is that of the orientation.
+    (tmp_path / "a.points").write_text("\n".join(lines))
+    bare = read_control_points(tmp_path / "a.points", orientation, nominal)
+    assert bare.crs == orientation.crs
+    np.testing.assert_allclose(bare.points.input_px, points.points.input_px, atol=1e-6)
 
 
 def test_gdal_takes_its_options(tmp_path: Path, located: tuple[Orientation, Grid]) -> None:

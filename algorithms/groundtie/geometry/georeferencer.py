@@ -13,6 +13,8 @@ from .point_tables import positions, require_places, table_rows
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
+SUFFIX = ".points"
+
 # It counts pixels from the image's corner, and rows downwards from 0.
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
 

@@ -12,6 +12,7 @@ import numpy as np
 from rasterio.crs import CRS
 
 from ..errors import TransformFileError
+from ..geometry.georeferencer import SUFFIX as GEOREFERENCER
 from ..geometry.point_tables import SIGMA
 from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
@@ -96,8 +97,8 @@ class ControlPoints:
                 Path(path).write_text(self._gdal_options(), encoding="utf-8")
             return
         own: Grid = SensorGrid(grid.transform, self.crs, grid.width, grid.height, orientation)
-        if Path(path).suffix.lower() == ".points":
-            own = grid  # the Georeferencer counts an image's own pixels
+        if Path(path).suffix.lower() == GEOREFERENCER:
+            own = grid  # which it has places in the image by
         covariance = self.points.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
         more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma, **self.points.more}
@@ -148,8 +149,11 @@ def read_control_points(
     """
     stored = read_others(path, image)
     if stored is None:
-        # Map positions are the image's pixels, wherever the image nominally is.
-        stored = read_tie_points(path, grid.on_own_pixels(), (HEIGHT, CORRELATION, *SIGMA))
+        # The Georeferencer has places in the image where its own geotransform, if any, has them.
+        # Elsewhere they are the image's pixels, wherever the image nominally is.
+        is_georeferencer = path.suffix.lower() == GEOREFERENCER
+        own = replace(grid, crs=None) if is_georeferencer else grid.on_own_pixels()
+        stored = read_tie_points(path, own, (HEIGHT, CORRELATION, *SIGMA))
     if len(stored) == 0:
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
