@@ -16,13 +16,21 @@ def leave_out(names: Sequence[str]) -> None:
     ValueError
         There is no rule of one of these names.
     """
-    known = {rule.name for rule in RULES}
+    known = {rule.name for rules in RULES.values() for rule in rules}
     for name in names:
         if name not in known:
             raise ValueError(f"no rule {name!r}; there are {'; '.join(sorted(known))}")
-    verdict.RULES = tuple(rule for rule in RULES if rule.name not in names)
+    verdict.RULES = {
+        stage: tuple(rule for rule in rules if rule.name not in names)
+        for stage, rules in RULES.items()
+    }
 
 
 def left_out() -> tuple[str, ...]:
     """Return the names of rules that are left out in this process."""
-    return tuple(rule.name for rule in RULES if rule not in verdict.RULES)
+    return tuple(
+        rule.name
+        for stage, rules in RULES.items()
+        for rule in rules
+        if rule not in verdict.RULES[stage]
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from groundtie.cli import spelled
@@ -66,7 +66,7 @@ def document(tools: Sequence[Tool], folder: Path) -> list[Path]:
     return [path for path, text in paths.items() if _update(path, text)]
 
 
-def document_rules(rules: Sequence[Rule], folder: Path) -> list[Path]:
+def document_rules(rules: Mapping[str, Sequence[Rule]], folder: Path) -> list[Path]:
     """Bring the table of rules on the verdict's page up to date; as `document`."""
     path = folder / RULES_PAGE
     return [path] if _update(path, rule_table(rules), RULES_BEGIN, RULES_END) else []
@@ -90,11 +90,12 @@ def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = 
     return f"{before}{begin}\n\n{text}\n\n{end}{after}"
 
 
-def rule_table(rules: Sequence[Rule]) -> str:
+def rule_table(rules: Mapping[str, Sequence[Rule]]) -> str:
     """Return the table of rules, in the order in which they are asked."""
     rows = [
-        (r.name, r.stage, r.refuses, r.source, r.advice, "nothing" if r.is_final else "another way")
-        for r in rules
+        (r.name, stage, r.refuses, r.source, r.advice, "nothing" if r.is_final else "another way")
+        for stage, of_stage in rules.items()
+        for r in of_stage
     ]
     titles = ("rule", "stage", "refuses", "source of the limit", "what to try", "tried next")
     return _rows(titles, rows)

@@ -31,6 +31,7 @@ from groundtie.kinds import (
     VectorIn,
     VectorOut,
 )
+from groundtie.registration.evidence import SEARCH
 from groundtie.registration.rules import RULES
 from groundtie.registration.verdict import NOT_JUDGED
 from groundtie.tools import load_tools
@@ -93,7 +94,7 @@ def test_advanced_parameters_stand_in_a_table_of_their_own() -> None:
 
 def test_advice_names_tools_that_can_follow_it() -> None:
     """A tool without these options, as register, gives it, too."""
-    advice = next(rule.advice for rule in RULES if rule.name == "nothing in common")
+    advice = next(rule.advice for rule in RULES[SEARCH] if rule.name == "nothing in common")
     named = [tool for tool in TOOLS if re.search(rf"\b{tool.name}\b", advice)]
     assert len(named) == 3
     for tool in named:
@@ -222,7 +223,9 @@ def test_every_rule_stands_in_one_row_in_its_order() -> None:
     assert header == titles
     next_tried = {True: "nothing", False: "another way"}
     assert rows == [
-        [r.name, r.stage, r.refuses, r.source, r.advice, next_tried[r.is_final]] for r in RULES
+        [r.name, stage, r.refuses, r.source, r.advice, next_tried[r.is_final]]
+        for stage, rules in RULES.items()
+        for r in rules
     ]
 
 
@@ -230,7 +233,7 @@ def test_a_rule_that_changes_changes_the_page(tmp_path: Path) -> None:
     path = tmp_path / document_tools.RULES_PAGE
     shutil.copy(DOCS / document_tools.RULES_PAGE, path)
     assert document_tools.document_rules(RULES, tmp_path) == []
-    changed = (replace(RULES[0], name="a house rule"), *RULES[1:])
+    changed = {**RULES, SEARCH: (replace(RULES[SEARCH][0], name="a house rule"),)}
     assert document_tools.document_rules(changed, tmp_path) == [path]
     assert "| a house rule |" in path.read_text(encoding="utf-8")
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -257,19 +258,12 @@ class HouseRules:
     is_final: bool = True
     asked: list[str] = field(default_factory=list)
 
-    def rules(self) -> tuple[Rule, ...]:
-        return tuple(
-            Rule(
-                f"house rule at {stage}",
-                stage,
-                "all",
-                "this test",
-                "go",
-                partial(self.ask, stage),
-                self.is_final,
-            )
-            for stage in dict.fromkeys(self.stages)
-        )
+    def rules(self) -> dict[str, tuple[Rule, ...]]:
+        return {stage: (self.rule(stage),) for stage in self.stages}
+
+    def rule(self, stage: str) -> Rule:
+        ask = partial(self.ask, stage)
+        return Rule(name_of(stage), "all", "this test", "go", ask, self.is_final)
 
     def ask(self, stage: str, _: object) -> str | None:
         self.asked.append(stage)
@@ -342,7 +336,10 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
 def test_radar_images_are_tried_by_their_ground_after_what_heights_may_cause(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rule: str, tries: int
 ) -> None:
-    house = HouseRules((AGREEMENT,), next(r.is_final for r in RULES if r.name == rule))
+    house = HouseRules(
+        (AGREEMENT,),
+        next(r.is_final for r in chain.from_iterable(RULES.values()) if r.name == rule),
+    )
     monkeypatch.setattr(verdict, "RULES", house.rules())
     with pytest.raises(NotRegisteredError, match="forbidden"):
         groundtie.match_sar_sar(*forest_files(tmp_path, 0.3, seed=1))

@@ -205,7 +205,7 @@ def test_a_refusal_names_its_rule_and_what_to_try() -> None:
     assert (accepted.rule, accepted.advice) == ("", "")
     assert accepted.sentence() == accepted.reason
     refused = judged(check_points(fallen(72)))
-    rule = next(rule for rule in RULES if rule.name == refused.rule)
+    rule = next(rule for rules in RULES.values() for rule in rules if rule.name == refused.rule)
     assert refused.advice == rule.advice
     assert refused.sentence() == f"{refused.reason}; {rule.advice}"
 
@@ -241,10 +241,10 @@ def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:
 
 @pytest.mark.parametrize("stage", [AGREEMENT, ERROR, SCENE, SURVEY])
 def test_a_rule_at_any_stage_refuses(stage: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    rule = Rule("house rule", stage, "all", "this test", "go", lambda _: "forbidden")
+    rule = Rule("house rule", "all", "this test", "go", lambda _: "forbidden")
     good = evidence(scatter(72, 0.3))
     assert judge(good).accepted
-    monkeypatch.setattr("groundtie.registration.verdict.RULES", (*RULES, rule))
+    monkeypatch.setattr("groundtie.registration.verdict.RULES", {**RULES, stage: (rule,)})
     found = judge(good)
     assert (found.accepted, found.rule, found.reason) == (False, "house rule", "forbidden")
     # Errors of matches that may be random measure nothing.

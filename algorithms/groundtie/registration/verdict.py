@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from typing import Any
 
 from ..errors import GroundTieError
@@ -113,8 +114,8 @@ NOT_JUDGED = Verdict(False, "not judged")
 
 def refusals(evidence: Evidence) -> Iterator[tuple[Rule, str]]:
     """Yield the rules of the evidence's stages that refuse, and why; the first of them decides."""
-    for rule in RULES:
-        reason = rule.reason(evidence) if rule.stage in evidence.stages else None
+    for rule in chain.from_iterable(RULES[stage] for stage in RULES if stage in evidence.stages):
+        reason = rule.reason(evidence)
         if reason is not None:
             yield rule, reason
 
@@ -154,7 +155,7 @@ def judge(evidence: EvidenceOfPoints) -> Verdict:
         check_points_agreeing=points.agreeing,
         log10_chance=points.log10_chance,
     )
-    if any(rule.name == verdict.rule for rule in RULES if rule.stage == AGREEMENT):
+    if any(rule.name == verdict.rule for rule in RULES[AGREEMENT]):
         # Errors of matches that may be random measure nothing.
         return verdict
     return replace(

@@ -1,9 +1,9 @@
 """The one list of rules by which registrations are refused.
 
-A rule looks at evidence and returns why it refuses, in a sentence, or None. Its `stage` states
-which kind of evidence it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's
-stages in their order, and the first one that refuses decides. What may be tried
-after that, `is_final` states.
+A rule looks at evidence and returns why it refuses, in a sentence, or None. Its stage is the kind
+of evidence that it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's stages
+in their order, and the first one that refuses decides. What may be tried after that, `is_final`
+states.
 
 Each stage has a module here, with its limits and their sources. To add a rule, write a function
 and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a
@@ -12,6 +12,21 @@ test asks for evidence that triggers it and evidence that does not.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from ..evidence import (
+    AGREEMENT,
+    ASSESSMENT,
+    ERROR,
+    IMAGES,
+    POSE,
+    REFINEMENT,
+    SCENE,
+    SEARCH,
+    SERIES,
+    SURVEY,
+    TIE_POINTS,
+)
 from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
 from .error import ERROR_RULES
@@ -27,16 +42,17 @@ from .tie_points import TIE_POINT_RULES
 
 __all__ = ["RULES", "Rule"]
 
-RULES: tuple[Rule, ...] = (
-    *TIE_POINT_RULES,
-    *IMAGES_RULES,
-    *SEARCH_RULES,
-    *ASSESSMENT_RULES,
-    *POSE_RULES,
-    *AGREEMENT_RULES,
-    *ERROR_RULES,
-    *SCENE_RULES,
-    *SURVEY_RULES,
-    *REFINEMENT_RULES,
-    *SERIES_RULES,
-)
+# By the stage whose evidence they read, in the order in which they are asked.
+RULES: Mapping[str, tuple[Rule, ...]] = {
+    TIE_POINTS: TIE_POINT_RULES,
+    IMAGES: IMAGES_RULES,
+    SEARCH: SEARCH_RULES,
+    ASSESSMENT: ASSESSMENT_RULES,
+    POSE: POSE_RULES,
+    AGREEMENT: AGREEMENT_RULES,
+    ERROR: ERROR_RULES,
+    SCENE: SCENE_RULES,
+    SURVEY: SURVEY_RULES,
+    REFINEMENT: REFINEMENT_RULES,
+    SERIES: SERIES_RULES,
+}

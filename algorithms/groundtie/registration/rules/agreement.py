@@ -9,7 +9,7 @@ from ...geometry.judging import (
     SMALLEST_SHARE_UNROTATED,
     TOLERANCE_PX,
 )
-from ..evidence import AGREEMENT, EvidenceOfPoints, RegistrationEvidence
+from ..evidence import EvidenceOfPoints, RegistrationEvidence
 from .rule import Rule
 
 
@@ -47,7 +47,6 @@ def _exchanged_roles(evidence: EvidenceOfPoints) -> str | None:
 AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "chance agreement",
-        AGREEMENT,
         f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
         f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f}",
         "[Moisan2004]; suites crossings, city and attacks",
@@ -56,7 +55,6 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "small share of check points",
-        AGREEMENT,
         f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree, or of a pose that "
         f"neither rotates nor scales less than {SMALLEST_SHARE_UNROTATED:.0%}",
         "suites simulated, real and attacks",
@@ -65,7 +63,6 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "exchanged roles",
-        AGREEMENT,
         "check points would agree as well by chance with a probability above "
         f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and with reference "
         "and input exchanged they agree as they may by chance, or the transform lies farther off "

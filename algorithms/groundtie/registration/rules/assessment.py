@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..evidence import ASSESSMENT
 from .rule import Rule
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ def _inconsistent(evidence: AssessmentEvidence) -> str | None:
 ASSESSMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "points not placed",
-        ASSESSMENT,
         "the transform cannot place a held-out point",
         "definition of a transform of the scene",
         "give the transform of this image, and points inside its area",
@@ -36,7 +34,6 @@ ASSESSMENT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "inconsistent ways",
-        ASSESSMENT,
         "a way there and back by other transforms misses its start by more than the largest error",
         "the user's largest error; [Suri2010] 2.5.3",
         "find out which of the transforms is wrong by points",

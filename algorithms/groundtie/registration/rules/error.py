@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..evidence import ERROR, EvidenceOfPoints
+from ..evidence import EvidenceOfPoints
 from .rule import Rule
 
 
@@ -31,7 +31,6 @@ def _uncertain(evidence: EvidenceOfPoints) -> str | None:
 ERROR_RULES: tuple[Rule, ...] = (
     Rule(
         "error at held-out points",
-        ERROR,
         "the root mean square error of held-out inliers is above the largest error",
         "the user's largest error",
         "give a more flexible model, or ask for less",
@@ -39,7 +38,6 @@ ERROR_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "uncertain transform",
-        ERROR,
         "the model varies by more than the largest error if blocks of points are left out in turn, "
         "or its CE90, what heights may displace all points by included, is above that of errors "
         "as large",

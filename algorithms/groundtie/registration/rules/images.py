@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...masks.used import LAYER, SURFACE
-from ..evidence import IMAGES, ImagesEvidence, RegistrationEvidence
+from ..evidence import ImagesEvidence, RegistrationEvidence
 from .rule import ON_GROUND, Rule
 
 
@@ -21,7 +21,6 @@ def _ground_not_found(evidence: ImagesEvidence | RegistrationEvidence) -> str | 
 IMAGES_RULES: tuple[Rule, ...] = (
     Rule(
         "ground not found",
-        IMAGES,
         "a radar image of a town has no speckle, or the reference no CRS, by which the ground is "
         "found",
         "suites city and coarse_towns",

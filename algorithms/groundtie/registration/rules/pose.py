@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..evidence import POSE
 from .rule import WIDER, Rule
 
 if TYPE_CHECKING:
@@ -49,7 +48,6 @@ def _not_exhaustive(evidence: PoseEvidence) -> str | None:
 POSE_RULES: tuple[Rule, ...] = (
     Rule(
         "pose by chance",
-        POSE,
         f"the best rotation, scale and shift are less than {_LEAST_HEIGHT:g} robust standard "
         "deviations above chance",
         "suite rotated_pairs",
@@ -58,7 +56,6 @@ POSE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "second pose",
-        POSE,
         f"the best pose is less than {_LEAST_RIVAL_RATIO:g} times as high as the best one "
         "elsewhere",
         "suite rotated_pairs",
@@ -67,7 +64,6 @@ POSE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "other pose",
-        POSE,
         "an exhaustive search over all rotations, and shifts of up to a quarter of the input, "
         f"finds another pose, whose corners are more than {SAME_SHARE:.0%} of the reference's "
         "longer side away",

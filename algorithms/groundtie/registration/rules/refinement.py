@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..evidence import REFINEMENT
 from .rule import Rule
 
 if TYPE_CHECKING:
@@ -42,7 +41,6 @@ def _not_folded(evidence: RefinementEvidence) -> str | None:
 REFINEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "narrow control",
-        REFINEMENT,
         f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image, "
         "unless somebody gives them and asks for a shift",
         "suite rpc",
@@ -51,7 +49,6 @@ REFINEMENT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "not nearer than before",
-        REFINEMENT,
         "held-out points are no nearer by the refined RPCs than by the delivered ones",
         "definition of a refinement",
         "keep the delivered RPCs",
@@ -59,7 +56,6 @@ REFINEMENT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "bias not folded",
-        REFINEMENT,
         f"new RPCs miss the bias by more than {_LARGEST_FOLDING_PX:g} px",
         "a hundredth of a pixel is below what control measures",
         "give a simpler model of the bias",

@@ -19,8 +19,6 @@ class Rule:
     ----------
     name
         What it is called in verdicts and in the documentation.
-    stage
-        Which kind of evidence it reads.
     refuses
         What it refuses, with its limit, for the documentation.
     source
@@ -37,7 +35,6 @@ class Rule:
     """
 
     name: str
-    stage: str
     refuses: str
     source: str
     advice: str

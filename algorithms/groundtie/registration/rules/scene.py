@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...masks.used import GROUND, SURFACE
-from ..evidence import SCENE, RegistrationEvidence
+from ..evidence import RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
 
@@ -63,7 +63,6 @@ def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
 SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "few points on the ground",
-        SCENE,
         "where the ground that was found in a radar image is matched alone in an image with RPCs: "
         f"fewer than {_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours",
         "suites rpc_city and attacks",
@@ -73,7 +72,6 @@ SCENE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "surface model elsewhere",
-        SCENE,
         f"the reference or the registered input does not correlate by {CLEAR_CORRELATION:g} with "
         "what the surface model and the view let expect, or the input does elsewhere by more than "
         f"the largest error; by {RENDERED_CORRELATION:g} where the surface model is the reference",
@@ -84,7 +82,6 @@ SCENE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "town matched whole",
-        SCENE,
         f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
         "town, and not its ground alone was matched",
         "suite city",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...errors import AmbiguousPlaceError, NothingFoundError, TooFewPointsError
-from ..evidence import SEARCH, SearchEvidence
+from ..evidence import SearchEvidence
 from .rule import WIDER, Rule
 
 
@@ -28,7 +28,6 @@ def _too_few_points(evidence: SearchEvidence) -> str | None:
 SEARCH_RULES: tuple[Rule, ...] = (
     Rule(
         "second place",
-        SEARCH,
         "a second place matches about as well as the best: half of its evidence (log10), or "
         "keypoints that agree on a second transform",
         "suite crossings and repetitive scenes",
@@ -39,7 +38,6 @@ SEARCH_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing in common",
-        SEARCH,
         "no place matches better than random ones would",
         "expected false alarms above 1; [Moisan2004]",
         f"{WIDER} (with coregister, match_sar_sar or match_optical)",
@@ -47,7 +45,6 @@ SEARCH_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "too few points",
-        SEARCH,
         "fewer points match, or agree, than the model needs",
         "number of parameters of the model",
         "give a larger part of the scene, or a simpler model",

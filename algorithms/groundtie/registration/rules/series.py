@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..evidence import SERIES
 from ..series_evidence import DateEvidence
 from .rule import Rule
 
@@ -41,7 +40,6 @@ def _one_way(evidence: DateEvidence) -> str | None:
 SERIES_RULES: tuple[Rule, ...] = (
     Rule(
         "date not readable",
-        SERIES,
         "the date's file cannot be opened, or has no place on the series' map",
         "definition of a date",
         "give the date with georeferencing, as a file that GDAL opens",
@@ -49,7 +47,6 @@ SERIES_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "date not linked",
-        SERIES,
         "no accepted registration connects a date with the reference, or with most other dates",
         "the rules of each registration",
         "see whether it shows the place and is free of clouds; give a larger search radius",
@@ -57,7 +54,6 @@ SERIES_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "loops do not close",
-        SERIES,
         "ways around a date and two others miss their start by more than the covariances explain "
         "once in 1000 times, or its registrations contradict the network, and no second way "
         "confirms it",
@@ -67,7 +63,6 @@ SERIES_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "one way alone",
-        SERIES,
         "a date that the reference, or the date with most links, refuses is reached by one way "
         "that no other confirms",
         "a loop is the only check on such a way",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...matching.parts import LEAST_EXCESS
 from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ..evidence import SURVEY, RegistrationEvidence
+from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
 # Chips all over are similar to a second place from this share on, and weakly similar below so many
@@ -150,7 +150,6 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
 SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
-        SURVEY,
         "three neighbouring chips or more match at one place elsewhere, all but the highest "
         f"together {LEAST_EXCESS:g} standard deviations of noise better than where the transform "
         "has each",
@@ -161,7 +160,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "second place nearby",
-        SURVEY,
         "chips all over, moved elsewhere together within "
         f"{SURVEY_RADIUS_PX} px, have a second peak of {PEAK_DEVIATIONS:g} robust standard "
         "deviations; or, without a mask of the ground, match at least "
@@ -173,7 +171,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "weak similarity",
-        SURVEY,
         f"of chips all over less than {_LEAST_CHIPS:g} overlap with the input where the transform "
         "has them; or, without a mask of the ground, their mean similarity there is below "
         f"{WEAK_HEIGHT:g} robust standard deviations of one of them",
@@ -184,7 +181,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "pixel-locked content",
-        SURVEY,
         "both images have the same content, pixel by pixel, such as labels or clouds, "
         "with edges sharper than those of ground, or beside one another; or without it less than a "
         "quarter of the chips is left, a second place matches about as well or is a peak of "
@@ -199,7 +195,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "rest elsewhere",
-        SURVEY,
         "between two radar images, without what they have in common, pixel by pixel, "
         "a second place matches about as well, and "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual, and a part lies "
@@ -211,7 +206,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "ground elsewhere",
-        SURVEY,
         "between two radar images, what is neither forest nor settlement matches elsewhere about "
         f"as well, and {REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual",
         "suite calibration, SAR–SAR pairs",

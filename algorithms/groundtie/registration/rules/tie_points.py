@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...geometry.judging import LARGEST_LOG10_CHANCE
-from ..evidence import TIE_POINTS
 from .rule import Rule
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ def _points_at_random(evidence: TiePointEvidence) -> str | None:
 TIE_POINT_RULES: tuple[Rule, ...] = (
     Rule(
         "tie points too near",
-        TIE_POINTS,
         "an error of 1 px in stored tie points moves the border of the raster by more than "
         f"{_LARGEST_BORDER_SPREAD:.0%} of its longer side: they lie at one place or along a line",
         "leverage; [Hastie2009] 3.2",
@@ -49,7 +47,6 @@ TIE_POINT_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "tie points at random",
-        TIE_POINTS,
         "as many random points would fit the model as well with a probability above "
         f"10^{LARGEST_LOG10_CHANCE:.0f}",
         "expected false alarms; [Moisan2004]",
