@@ -214,7 +214,7 @@ def _orthorectify(
         crs = stack.enter_context(open_raster(given["reference"])).grid.crs
         image = open_oriented_image(given["input"], rpc_file, ground, crs, stack, SILENT)
         staged = stack.enter_context(Outputs()).stage(output)
-        write_orthoimage(image.source, image.orientation, staged, context)
+        write_orthoimage(image, staged, context)
 
 
 # What `refine` takes and the tool `register` does not ask for.

@@ -7,15 +7,13 @@ from pathlib import Path
 from ..context import Context
 from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid
-from ..rasters.reading import RasterSource
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..sensor.dense import DenseOrientation
-from ..sensor.orientation import Orientation
+from .sensor_input import OrientedImage
 
 
 def write_orthoimage(
-    source: RasterSource,
-    by: Orientation,
+    image: OrientedImage,
     path: Path,
     context: Context,
     grid: Grid | None = None,
@@ -26,10 +24,8 @@ def write_orthoimage(
 
     Parameters
     ----------
-    source
-        The image, open.
-    by
-        How it sees the ground.
+    image
+        The image, and how it sees the ground.
     path
         The GeoTIFF; see `atomic.Outputs.stage`.
     context
@@ -46,6 +42,7 @@ def write_orthoimage(
     NoOverlapError
         The image shows nothing of the grid that was given.
     """
+    source, by = image.source, image.orientation
     if grid is None:
         # Where another georeferencing than the RPCs places the image does not count.
         pixels = source.grid.on_own_pixels()

@@ -54,7 +54,7 @@ class Ground:
                 f"({', '.join(DATUMS)}) or a geoid grid"
             )
 
-    def note(self, orientation: Orientation) -> str:
+    def _note(self, orientation: Orientation) -> str:
         """Return in words which heights are used, and of which share of the image they are."""
         if self.dem is not None:
             share = orientation.known_share
@@ -63,10 +63,17 @@ class Ground:
         height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
-    def orientation(
-        self, source: RasterSource, rpc: RPC, crs: CRS, stack: ExitStack
-    ) -> Orientation:
-        """Return an image's orientation; rasters are opened within `stack`.
+    def orient(
+        self,
+        source: RasterSource,
+        rpc: RPC,
+        crs: CRS | None,
+        stack: ExitStack,
+        progress: Progress,
+    ) -> OrientedImage:
+        """Locate an image on a map, by default on that of its UTM zone.
+
+        Rasters are opened within `stack`; `progress` receives which heights are used.
 
         Raises
         ------
@@ -79,7 +86,7 @@ class Ground:
         def opened(path: Path) -> RasterSource:
             return stack.enter_context(open_raster(path))
 
-        geoid = self.geoid
+        crs, geoid = crs or _utm_of(source, rpc), self.geoid
         if geoid is None and self.datum is not None:
             geoid = find_geoid(self.datum)
         dem = None if self.dem is None else opened(self.dem)
@@ -95,7 +102,9 @@ class Ground:
                 f"{self.dem} covers only {_percent(found.known_share)} of the area of "
                 f"{source.path}, less than {_percent(self.least_cover)}"
             )
-        return found
+        heights = self._note(found)
+        progress.update(0.0, heights)
+        return OrientedImage(source, found, heights)
 
 
 def _percent(share: float) -> str:
@@ -143,18 +152,12 @@ def open_oriented_image(
     stack: ExitStack,
     progress: Progress,
 ) -> OrientedImage:
-    """Open an image in sensor geometry and locate it on a map; by default on that of its UTM zone.
-
-    `progress` receives which heights are used.
-    """
+    """Open an image in sensor geometry and locate it on a map; see `Ground.orient`."""
     source, rpc = open_sensor_image(image, rpc_file, stack)
-    orientation = ground.orientation(source, rpc, crs or utm_of(source, rpc), stack)
-    heights = ground.note(orientation)
-    progress.update(0.0, heights)
-    return OrientedImage(source, orientation, heights)
+    return ground.orient(source, rpc, crs, stack, progress)
 
 
-def utm_of(source: RasterSource, rpc: RPC) -> CRS:
+def _utm_of(source: RasterSource, rpc: RPC) -> CRS:
     """Return the UTM zone (WGS 84) that an image's centre lies in."""
     size = source.grid.width, source.grid.height
     longitude, latitude = np.median(seen_at(rpc, size, rpc.offset[2]), axis=0).tolist()

@@ -19,7 +19,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.grid import require_map
 from ..rasters.reading import bounded_cache, open_raster
 from ..registration.orthorectification import write_orthoimage
-from ..registration.sensor_input import Ground, open_sensor_image, utm_of
+from ..registration.sensor_input import Ground, open_sensor_image
 from .parameters import general, sensor
 from .results import SIZE_OUTPUTS, WrittenRaster
 
@@ -94,15 +94,11 @@ def orthorectify(
             grid = stack.enter_context(open_raster(reference)).grid
             if grid.crs is None:
                 raise GeoreferencingError(f"{reference} has no CRS")
-        map_crs = grid.crs if grid is not None else _crs(crs) or utm_of(source, model)
-        orientation = ground.orientation(source, model, map_crs, stack)
-        heights = ground.note(orientation)
-        context.update(0.0, heights)
+        map_crs = _crs(crs) if grid is None else grid.crs
+        oriented = ground.orient(source, model, map_crs, stack, progress)
         staged = stack.enter_context(Outputs()).stage(output)
-        target = write_orthoimage(
-            source, orientation, staged, context, grid, pixel_size, resampling
-        )
-    return OrthoResult(output, target, heights)
+        target = write_orthoimage(oriented, staged, context, grid, pixel_size, resampling)
+    return OrthoResult(output, target, oriented.heights)
 
 
 def _crs(text: str | None) -> CRS | None:
