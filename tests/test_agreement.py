@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 import toys
+from toys import run_tools
 
 import groundtie
-from groundtie.cli import main, spelled
+from groundtie.cli import spelled
 from groundtie.declaration import HANDED_THROUGH, Parameter, Tool
 from groundtie.kinds import Band, Choice, Flag, Kind, Number, OutputKind
 from groundtie.tools import load_tools
@@ -37,7 +38,7 @@ def option(parameter: Parameter) -> str:
 
 
 def help_text(tool: Tool, capsys: pytest.CaptureFixture[str]) -> str:
-    assert main([tool.name.replace("_", "-"), "--help"], tools=[tool]) == 0
+    assert run_tools([tool.name.replace("_", "-"), "--help"], [tool]) == 0
     return capsys.readouterr().out
 
 
@@ -113,7 +114,7 @@ def test_the_command_line_needs_what_is_required(
             at = words.index(word)
             name = [words[at - 1]] if words[at - 1].startswith("--") else []
             less = words[: at - len(name)] + words[at + 1 :]
-            assert main(less, tools=[tool]) == 2
+            assert run_tools(less, [tool]) == 2
             # What is left moves up, where a choice is the first to look at it.
             assert re.search("issing|must be one of", capsys.readouterr().err)
 
@@ -196,7 +197,7 @@ def test_both_refuse_what_is_out_of_range(
     assert isinstance(kind, Number)
     for value in (kind.minimum - 1, kind.maximum + 1):
         if abs(value) < 1e300:
-            assert main(call(tool, {parameter.name: str(value)}), tools=[tool]) == 2
+            assert run_tools(call(tool, {parameter.name: str(value)}), [tool]) == 2
             assert f"{option(parameter)} must be {kind.range_text}" in capsys.readouterr().err
             required = {p.name: fitting(p.name, p.kind) for p in tool.parameters if p.required}
             with pytest.raises(
@@ -214,7 +215,7 @@ def test_both_refuse_what_is_no_choice(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(call(tool, {parameter.name: "no-such"}), tools=[tool]) == 2
+    assert run_tools(call(tool, {parameter.name: "no-such"}), [tool]) == 2
     assert f"{spelled(parameter)} must be one of" in capsys.readouterr().err
     required = {p.name: fitting(p.name, p.kind) for p in tool.parameters if p.required}
     with pytest.raises(ValueError, match=f"{parameter.name} must be one of"):

@@ -20,7 +20,7 @@ import pytest
 import rasterio
 import toys
 from noise_pairs import ORIGIN, POINTS, true_input_px, write_pair, write_raster
-from toys import TOY
+from toys import TOY, run_tools
 
 from groundtie import load_transform
 from groundtie.cli import main
@@ -47,7 +47,7 @@ def _surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 
 
 def run(words: str) -> int:
-    return main(words.split(), tools=[TOY])
+    return run_tools(words.split(), [TOY])
 
 
 GOOD = "toy a.tif b.tif c.tif --size 3"
@@ -215,7 +215,7 @@ def test_the_shell_completes_commands_options_words_and_files(
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     with pytest.raises(SystemExit) as ended:
-        main([], tools=[TOY, load_tool("coregister_series")])
+        run_tools([], [TOY, load_tool("coregister_series")])
     assert ended.value.code == 0
     assert capsys.readouterr().out.split() == expected
 
@@ -310,7 +310,7 @@ def test_workers_stand_before_or_after_the_tools_name(words: str, workers: int |
         seen.append(values["workers"])
         return TOY.run(**values)
 
-    assert main(words.split(), tools=[dataclasses.replace(TOY, run=noting)]) == 0
+    assert run_tools(words.split(), [dataclasses.replace(TOY, run=noting)]) == 0
     assert seen == [workers]
 
 
@@ -330,7 +330,6 @@ def test_a_tool_without_workers_ignores_those_before_its_name() -> None:
 NOISY = f"""
 import ctypes, dataclasses, logging, re, sys, warnings
 import rasterio, toys
-from groundtie.cli import main
 
 def run(**values):
     warnings.warn("noise")
@@ -341,7 +340,7 @@ def run(**values):
     return toys.toy(**{{**values, "title": str(len(libraries))}})
 
 tool = dataclasses.replace(toys.TOY, run=run)
-sys.exit(main({[*GOOD.split(), "--json"]!r}, tools=[tool]))
+sys.exit(toys.run_tools({[*GOOD.split(), "--json"]!r}, [tool]))
 """
 
 

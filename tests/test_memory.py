@@ -12,11 +12,10 @@ from pathlib import Path
 
 import pytest
 import rasterio.env
-from toys import TOY
+from toys import TOY, run_tools
 
 import groundtie
 from groundtie import memory
-from groundtie.cli import main
 from groundtie.errors import MemoryLimitError, ParameterError
 from groundtie.rasters.reading import bounded_cache
 
@@ -63,13 +62,13 @@ def test_the_command_line_sets_it_for_one_command(
         raise ParameterError("seen")
 
     tool = replace(TOY, run=run)
-    assert main(["--memory", "400", *GOOD], tools=[tool]) == 2
+    assert run_tools(["--memory", "400", *GOOD], [tool]) == 2
     assert seen == [400_000_000]
     assert os.environ.get(memory.VARIABLE) == before
 
 
 def test_a_bad_amount_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--memory", "0.5", *GOOD], tools=[TOY]) == 2
+    assert run_tools(["--memory", "0.5", *GOOD], [TOY]) == 2
     error = capsys.readouterr().err
     assert "memory must be 100 to" in error and len(error.splitlines()) == 1
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
+from unittest.mock import patch
 
-from groundtie.cli import main
+from groundtie import cli
 from groundtie.declaration import Output, Tool, tool, tool_of
 from groundtie.errors import NotRegisteredError
 from groundtie.kinds import (
@@ -165,5 +166,13 @@ def load_toy(name: str) -> Tool:
     return {tool.name: tool for tool in (TOY, RETURNING_TOY)}[name]
 
 
+def run_tools(args: Sequence[str] | None, tools: Sequence[Tool]) -> int:
+    """Run the command line with these tools instead of the package's."""
+    by_name = {tool.name: tool for tool in tools}
+    load = by_name.__getitem__
+    with patch.multiple(cli, NAMES=tuple(by_name), load_tool=load, named_tool=load):
+        return cli.main(args)
+
+
 if __name__ == "__main__":
-    sys.exit(main(tools=[TOY]))
+    sys.exit(run_tools(None, [TOY]))

@@ -26,18 +26,17 @@ from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
 from .packages import use_one_thread
 from .progress import Progress
+from .tools import NAMES, load_tool, named_tool
 from .version import __version__
 
 
-def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Parameters
     ----------
     args
         Arguments without the program's name (default: those of the process).
-    tools
-        Tools to offer (default: all).
 
     Returns
     -------
@@ -49,8 +48,7 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
     set_heaps()
     with _signals() as received:
         try:
-            group = _all_tools() if tools is None else _these_tools(tools)
-            command = click.version_option(__version__, message="%(prog)s %(version)s")(group)
+            command = click.version_option(__version__, message="%(prog)s %(version)s")(ToolGroup())
             code = command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
             return _fail(_usage(error), error.exit_code)
@@ -60,17 +58,6 @@ def main(args: Sequence[str] | None = None, tools: Sequence[Tool] | None = None)
         except GroundTieError as error:
             return _fail(error.one_line(), error.exit_code)
     return int(code or 0)
-
-
-def _all_tools() -> ToolGroup:
-    from .tools import NAMES, load_tool, named_tool
-
-    return ToolGroup(NAMES, load_tool, lambda name: named_tool(name).summary)
-
-
-def _these_tools(tools: Sequence[Tool]) -> ToolGroup:
-    by_name = {tool.name: tool for tool in tools}
-    return ToolGroup(tuple(by_name), by_name.__getitem__, lambda name: by_name[name].summary)
 
 
 def _fail(message: str, exit_code: int) -> int:
@@ -122,12 +109,7 @@ def _signals() -> Iterator[list[int]]:
 class ToolGroup(click.Group):
     """The command `groundtie`; a tool is loaded, with all that it imports, when it is needed."""
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        load: Callable[[str], Tool],
-        summarise: Callable[[str], str],
-    ) -> None:
+    def __init__(self) -> None:
         super().__init__(
             "groundtie",
             help="Register satellite images to one another.",
@@ -154,8 +136,7 @@ class ToolGroup(click.Group):
             ],
             context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
         )
-        self._names = {_command_name(name): name for name in names}
-        self._load, self._summarise = load, summarise
+        self._names = {_command_name(name): name for name in NAMES}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the tools in the order in which they are declared."""
@@ -164,20 +145,20 @@ class ToolGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a tool; None if there is no such tool."""
         name = self._names.get(cmd_name)
-        return None if name is None else ToolCommand(self._load(name))
+        return None if name is None else ToolCommand(load_tool(name))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the commands that begin so; none of them is loaded for it."""
         options = super().shell_complete(ctx, incomplete) if incomplete.startswith("-") else []
         return options + [
-            CompletionItem(command, help=self._summarise(name))
+            CompletionItem(command, help=named_tool(name).summary)
             for command, name in self._names.items()
             if command.startswith(incomplete)
         ]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write a line for each tool; none of them is loaded for it."""
-        rows = [(command, self._summarise(name)) for command, name in self._names.items()]
+        rows = [(command, named_tool(name).summary) for command, name in self._names.items()]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
 
