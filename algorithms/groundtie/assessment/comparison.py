@@ -106,6 +106,5 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
         common = covering_grid(grid, grid.to_own_map(footprint, transform.crs), within=True)
     except NoOverlapError as error:
         raise NoOverlapError(f"{input.path}, as registered, misses {reference.path}") from error
-    size = common.width, common.height
-    pair = ImagePair(Image(reference), Image(input), common, size, common)
+    pair = ImagePair(Image(reference), Image(input), common, common.size, common)
     return Comparison.of(pair, transform.of_map(grid.crs))

@@ -123,9 +123,9 @@ def lattice(grid: Grid) -> FloatArray:
 
     No pixel is taken twice.
     """
-    step = max(max(grid.width, grid.height) / _PLACES, 1.0)
+    step = max(max(grid.size) / _PLACES, 1.0)
     axes = []
-    for side in (grid.width, grid.height):
+    for side in grid.size:
         count = max(round(side / step), 1)
         # In the middles of equal parts, as pixels lie in a grid.
         axes.append((np.arange(count) + 0.5) * side / count - 0.5)

@@ -133,7 +133,7 @@ def _surface(
     grid = source.grid
     require_both_or_none(grid.crs, crs, f"{source.path} and the reference")
     left, bottom, right, top = region
-    last = np.array([grid.width, grid.height]) - 1
+    last = np.array(grid.size) - 1
 
     def to_px(xy: FloatArray) -> FloatArray:
         px = grid.map_to_pixel(reproject(xy, crs, grid.crs))

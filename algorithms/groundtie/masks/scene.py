@@ -65,14 +65,14 @@ class Scene:
     @property
     def whole(self) -> Window:
         """All pixels of the grid."""
-        return Window(0, 0, self.grid.width, self.grid.height)
+        return Window(0, 0, *self.grid.size)
 
     def reduced(self, factor: int, progress: Progress = SILENT) -> Patch:
         """Return the whole scene as means over blocks of factor × factor pixels.
 
         Blocks at the right and lower border may be cut.
         """
-        width, height = self.grid.width, self.grid.height
+        width, height = self.grid.size
         rows = max(_STRIP_PIXELS // width, 1) * factor
         strips = []
         for top in range(0, height, rows):

@@ -63,7 +63,7 @@ class _Warp:
         nodata = _choose_nodata(source)
         if nodata is not None:
             require_fit(nodata, source.dtype)
-        size = source.grid.width, source.grid.height
+        size = source.grid.size
         factor = (1, 1) if method == "nearest" else reduction(target, to_input_px, size)
         return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
 
@@ -103,7 +103,7 @@ class _Warp:
         """Return some bands of a tile and which of their pixels are valid, (bands, h, w)."""
         place, bands = task
         px = coordinates(self.target.window(*place), self.to_input_px)
-        size = (self.source.grid.width, self.source.grid.height)
+        size = self.source.grid.size
         out = np.zeros((len(bands), place.height, place.width), self.source.dtype)
         valid = np.zeros(out.shape, bool)
         found = read_around(
@@ -258,7 +258,7 @@ def write_with_geotransform(
     OutputError, RasterOpenError, ParameterError, CancelledError
         As `warp_raster`.
     """
-    if (grid.width, grid.height) != (source.grid.width, source.grid.height):
+    if grid.size != source.grid.size:
         raise ValueError("a new geotransform does not change the size of a raster")
     count = tile_count(grid)
     with create_like(
@@ -290,6 +290,6 @@ def _is_covered(warp: _Warp) -> bool:
         return False
     grid = warp.source.grid
     return all(
-        lattice(warp.target.window(*tile), warp.to_input_px).lies_within(grid.width, grid.height)
+        lattice(warp.target.window(*tile), warp.to_input_px).lies_within(*grid.size)
         for tile in tiles(warp.target)
     )

@@ -82,6 +82,11 @@ class Grid:
     height: int
     is_on_pixels: bool = field(default=False, compare=False, kw_only=True)
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.width, self.height
+
     @cached_property
     def centre_transform(self) -> Affine:
         """Transform of pixel positions, counted from the first pixel's centre, to the map."""
@@ -112,7 +117,7 @@ class Grid:
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
         px = np.asarray(px, float)
-        size = np.array([self.width, self.height])
+        size = np.array(self.size)
         return np.asarray(np.all((px >= -0.5) & (px <= size - 0.5), axis=-1))
 
     def covers(self, xy: ArrayLike) -> NDArray[np.bool_]:
@@ -188,7 +193,7 @@ class Grid:
 
     def scaled(self, factor: float) -> Grid:
         """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
-        width, height = (max(int(side / factor + 1e-6), 1) for side in (self.width, self.height))
+        width, height = (max(int(side / factor + 1e-6), 1) for side in self.size)
         return self.on_same_map(compose(self.transform, Affine.scale(factor)), width, height)
 
     def window(self, col: int, row: int, width: int, height: int) -> Grid:
@@ -212,7 +217,7 @@ class Grid:
 
     def on_own_pixels(self) -> Grid:
         """Return these pixels as their own map, wherever they lie on another."""
-        return Grid(PIXEL_COORDINATES, None, self.width, self.height)
+        return Grid(PIXEL_COORDINATES, None, *self.size)
 
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""
@@ -229,7 +234,7 @@ class Grid:
                 )
             ]
         )
-        return np.asarray(unit * [self.width, self.height] - 0.5)
+        return np.asarray(unit * self.size - 0.5)
 
     def to_json(self) -> dict[str, Any]:
         """Return the grid as values that JSON can carry."""
@@ -257,7 +262,7 @@ class Grid:
 
     def lattice(self, count: int = 9) -> FloatArray:
         """Return pixel positions all over the grid, `count` a side, shape (count², 2)."""
-        return mesh(*(np.linspace(0, side - 1, count) for side in (self.width, self.height)))
+        return mesh(*(np.linspace(0, side - 1, count) for side in self.size))
 
 
 def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:

@@ -69,7 +69,7 @@ class RasterSurface:
 
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface that some of its pixel positions, (n, 2), need."""
-        size = np.array([self.source.grid.width, self.source.grid.height])
+        size = np.array(self.source.grid.size)
         low = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int)
         high = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int)
         window = Window.between(low, high + 1)
@@ -164,7 +164,7 @@ def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArra
     RasterContentError
         It holds no value there.
     """
-    size = np.array([source.grid.width, source.grid.height])
+    size = np.array(source.grid.size)
     px = finite(to_px(region))
     if not len(px):
         raise NoOverlapError(f"{source.path} does not cover the image")

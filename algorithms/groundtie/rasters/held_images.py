@@ -93,7 +93,7 @@ def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
 def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) -> Image:
     """Return an image of the means that `sample` takes first: it starts at multiples of them."""
     source = image.source
-    x, y = reduction(level, to_px, (source.grid.width, source.grid.height))
+    x, y = reduction(level, to_px, source.grid.size)
     width, height = -(-source.grid.width // x), -(-source.grid.height // y)
     is_shown = width * height * _SHOWN_SHARE <= level.width * level.height
     # Sensor models count in their own pixels.

@@ -263,7 +263,7 @@ def require_georeferenced_alike(reference: RasterSource, input: RasterSource) ->
 def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:
     """Return the shift from which on an image with an outline, (n, 2), shows nothing of a grid."""
     low, high = _extent(outline_px)
-    return float(np.hypot(*np.maximum(np.array([grid.width, grid.height]) - low, high)))
+    return float(np.hypot(*np.maximum(np.array(grid.size) - low, high)))
 
 
 def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:
@@ -307,7 +307,7 @@ def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
     if not len(finite(outline_px)):
         return None
     first, last = _extent(outline_px)
-    size = np.array([grid.width, grid.height])
+    size = np.array(grid.size)
     low = np.clip(np.ceil(first - margin_px), 0, size).astype(int)
     high = np.clip(np.floor(last + margin_px) + 1, 0, size).astype(int)
     return Window.between(low, high) if (high > low).all() else None

@@ -18,7 +18,7 @@ _KEPT_SHARE = 0.99
 
 def mask_span(mask: RasterSource, grid: Grid, to_mask_px: PointFunction) -> tuple[int, int]:
     """Return how many columns and rows of a mask a pixel of a grid spans: see `reduction`."""
-    return reduction(grid, to_mask_px, (mask.grid.width, mask.grid.height))
+    return reduction(grid, to_mask_px, mask.grid.size)
 
 
 def kept_on(

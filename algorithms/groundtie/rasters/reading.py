@@ -103,7 +103,7 @@ class RasterSource:
     @property
     def window(self) -> Window:
         """The whole raster."""
-        return Window(0, 0, self.grid.width, self.grid.height)
+        return Window(0, 0, *self.grid.size)
 
     @property
     def dtype(self) -> np.dtype[Any]:

@@ -102,9 +102,7 @@ def _is_mean_of(level: RasterSource, before: RasterSource) -> bool:
     """
     band = level.image_bands[0]
     for place in _PLACES:
-        col, row = (
-            int((side - _SAMPLE_PX) * place) for side in (level.grid.width, level.grid.height)
-        )
+        col, row = (int((side - _SAMPLE_PX) * place) for side in level.grid.size)
         values, valid = level.read_bands(Window(col, row, _SAMPLE_PX, _SAMPLE_PX), [band])
         x, y = before.grid.width / level.grid.width, before.grid.height / level.grid.height
         cols, rows = (np.arange(_SAMPLE_PX + 1, dtype=np.float64) + first for first in (col, row))

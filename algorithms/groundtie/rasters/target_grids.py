@@ -54,7 +54,7 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     low = np.floor(px.min(axis=0) + 0.5 + POSITION_ERROR_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - POSITION_ERROR_PX).astype(int)
     if within:
-        size = (lattice.width, lattice.height)
+        size = lattice.size
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
     if np.any(high <= low):
         raise NoOverlapError("the footprint of the image does not lie on the grid")
@@ -92,7 +92,7 @@ def registered_grid(
         The transform stretches the raster out of all proportion, or the pixels are too many.
     """
     usual = _registered_grid(input_grid, px_to_map, crs, None)
-    stretch = np.hypot(usual.width, usual.height) / np.hypot(input_grid.width, input_grid.height)
+    stretch = np.hypot(*usual.size) / np.hypot(*input_grid.size)
     if stretch > _LARGEST_STRETCH:
         raise GridSizeError(
             f"the transform stretches the raster {stretch:.3g} times: it is damaged, or not for "

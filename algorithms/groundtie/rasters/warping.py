@@ -240,7 +240,7 @@ def sample_by(
         if window is not None:  # every kernel gives the pixels themselves
             return read(window, None)
         px = nodes.coordinates()
-    size = (source.grid.width, source.grid.height)
+    size = source.grid.size
     if factor is None:
         factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
     part = read_around(px, size, method, factor, read)

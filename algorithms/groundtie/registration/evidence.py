@@ -328,7 +328,7 @@ class RegistrationEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the points that were used."""
-        fitted, size = self.estimate.points, (self.grid.width, self.grid.height)
+        fitted, size = self.estimate.points, self.grid.size
         return 1 - hull_share(self.grid.map_to_pixel(fitted.reference_xy[fitted.used]), size)
 
 

@@ -110,7 +110,7 @@ def pair_images(
     radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
     if not grid.is_georeferenced:
         if radius_m is None and spec.free.radius_share is not None:
-            radius_m = spec.free.radius_share * max(grid.width, grid.height)
+            radius_m = spec.free.radius_share * max(grid.size)
         rotation_deg = spec.free.rotation_deg if rotation_deg is None else rotation_deg
         scale = spec.free.scale if scale is None else scale
     images = make_pair(

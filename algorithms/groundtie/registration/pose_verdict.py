@@ -180,7 +180,7 @@ class PoseSurveyEvidence:
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the chips that agree."""
         grid, agreeing = self.found.grid, self.found.px[self.found.agrees]
-        return 1 - hull_share(agreeing.astype(float), (grid.width, grid.height))
+        return 1 - hull_share(agreeing.astype(float), grid.size)
 
 
 def judge_pose(evidence: PoseEvidence) -> Verdict:

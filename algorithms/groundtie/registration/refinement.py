@@ -203,7 +203,7 @@ class Refinement:
         table = points.points
         fitted, checked = table.fit, table.check
         rpc = image.orientation.rpc
-        seen = points.seen_by(rpc, image.size)
+        seen = points.seen_by(rpc, image.source.grid.size)
         control = seen.take(fitted)
         try:
             adjustment = adjust(control, model)
@@ -231,7 +231,7 @@ class Refinement:
     @property
     def grid(self) -> Grid:
         """The image's pixels."""
-        return Grid(PIXEL_COORDINATES, None, *self.image.size)
+        return self.image.source.grid.on_own_pixels()
 
     def residuals(self) -> PointErrors:
         """Return by how much the refined RPCs miss the points, in the image.

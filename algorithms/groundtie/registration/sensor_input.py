@@ -138,11 +138,6 @@ class OrientedImage:
     orientation: Orientation
     heights: str
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
-        return self.source.grid.width, self.source.grid.height
-
 
 def open_oriented_image(
     image: Path,
@@ -159,7 +154,7 @@ def open_oriented_image(
 
 def _utm_of(source: RasterSource, rpc: RPC) -> CRS:
     """Return the UTM zone (WGS 84) that an image's centre lies in."""
-    size = source.grid.width, source.grid.height
-    longitude, latitude = np.median(seen_at(rpc, size, rpc.offset[2]), axis=0).tolist()
+    seen = seen_at(rpc, source.grid.size, rpc.offset[2])
+    longitude, latitude = np.median(seen, axis=0).tolist()
     zone = int((longitude + 180) // 6) % 60 + 1
     return CRS.from_epsg((32600 if latitude >= 0 else 32700) + zone)

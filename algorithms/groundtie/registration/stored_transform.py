@@ -91,7 +91,7 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
         if not _boxes_meet(seen, registered):
             raise NoOverlapError(f"{source.path} does not lie where {name} was made for")
         return Transform(found.model, found.crs, own)
-    if (own.width, own.height) != (registered.width, registered.height):
+    if own.size != registered.size:
         raise GeoreferencingError(
             f"{source.path} has {own.width} × {own.height} pixels, but {name} was made for "
             f"{registered.width} × {registered.height}, and not both are georeferenced"
@@ -101,5 +101,5 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
 
 def _boxes_meet(px: FloatArray, grid: Grid) -> bool:
     px = px[np.isfinite(px).all(axis=1)]
-    size = np.array([grid.width, grid.height]) - 0.5
+    size = np.array(grid.size) - 0.5
     return len(px) > 0 and bool(np.all((px.max(axis=0) > -0.5) & (px.min(axis=0) < size)))

@@ -131,7 +131,7 @@ class TiePointEvidence:
     @property
     def side_px(self) -> int:
         """The raster's longer side."""
-        return max(self.input_grid.width, self.input_grid.height)
+        return max(self.input_grid.size)
 
     @cached_property
     def border_spread_px(self) -> float:

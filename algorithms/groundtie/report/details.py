@@ -36,7 +36,7 @@ def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
         (label, errors.position_px[check[k]])
         for label, k in extremes(errors.length_px[check], _EXTREMES)
     ]
-    half = min(SIDE_PX, grid.width, grid.height) / 2
+    half = min(SIDE_PX, *grid.size) / 2
     corners = mesh((half, grid.width - half), (half, grid.height - half))
     return found + list(zip((f"{name} corner" for name in _CORNERS), corners, strict=True))
 
@@ -44,7 +44,7 @@ def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
 def shown(pair: ImagePair, transform: Transform, errors: PointErrors) -> list[dict[str, Any]]:
     """Return what a page shows at these places of a pair, which has no masks."""
     grid = pair.grid
-    side = min(SIDE_PX, grid.width, grid.height)
+    side = min(SIDE_PX, *grid.size)
     made = []
     for label, at in places(errors, grid):
         col, row = (round(float(k) - side / 2) for k in at)

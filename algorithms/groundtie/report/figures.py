@@ -56,7 +56,7 @@ class Arrows:
 
 def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     """Exaggerate residuals by a round factor so that the typical one is well visible."""
-    side = max(grid.width, grid.height)
+    side = max(grid.size)
     # A flexible model leaves next to nothing at the points of its own fit.
     enough = errors.agreeing.sum() >= FEWEST_CHECK_POINTS
     which = errors.agreeing if enough else errors.used
@@ -69,7 +69,7 @@ def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
 
 def scaled_arrows(by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
     """Exaggerate by a round factor so that what is long is no more than a tenth of the grid."""
-    side = max(grid.width, grid.height)
+    side = max(grid.size)
     factor = max(round_length(0.1 * side / max(longest_px, SMALLEST_PX)), 1.0)
     return _arrows(by_px, factor, side)
 
@@ -222,7 +222,7 @@ def map_axes(grid: Grid) -> Any:
     """Return axes whose edges are the grid's, rows downwards."""
     from matplotlib.figure import Figure
 
-    inches = 8 / max(grid.width, grid.height)
+    inches = 8 / max(grid.size)
     axes = Figure(figsize=(grid.width * inches, grid.height * inches)).add_axes((0, 0, 1, 1))
     axes.set(xlim=(-0.5, grid.width - 0.5), ylim=(grid.height - 0.5, -0.5))
     axes.set_axis_off()
@@ -254,7 +254,7 @@ def draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
     """Draw the arrow that a round residual has, at the lower left."""
     from matplotlib.patches import Rectangle
 
-    unit = max(grid.width, grid.height) / 100
+    unit = max(grid.size) / 100
     length = arrows.scale_px * arrows.exaggeration
     left, low = 2 * unit, grid.height - 2 * unit
     box = Rectangle((left, low), length + 3 * unit, -6 * unit, fc="white", ec="#999999", lw=0.8)

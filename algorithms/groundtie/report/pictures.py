@@ -36,7 +36,7 @@ _NODES = 33
 
 def overview_grid(grid: Grid, longest_px: int = OVERVIEW_PX) -> Grid:
     """Return a grid with larger pixels, if need be, so that no side is longer than this."""
-    factor = max(grid.width, grid.height) / longest_px
+    factor = max(grid.size) / longest_px
     return grid.scaled(factor) if factor > 1 else grid
 
 
@@ -47,7 +47,7 @@ def overview_positions(to_input_px: PointFunction, grid: Grid) -> PointFunction:
     """
     from scipy.interpolate import RectBivariateSpline
 
-    cols, rows = (np.linspace(-0.5, side - 0.5, _NODES) for side in (grid.width, grid.height))
+    cols, rows = (np.linspace(-0.5, side - 0.5, _NODES) for side in grid.size)
     nodes = mesh(cols, rows)
     px = to_input_px(grid.pixel_to_map(nodes))
     if not np.isfinite(px).all():

@@ -177,7 +177,7 @@ def orient(
     GeoreferencingError, RasterContentError
         See `terrain_heights`.
     """
-    size = source.grid.width, source.grid.height
+    size = source.grid.size
     extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.height_range_m])
     heights: Heights
     if dem is None:
@@ -218,7 +218,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
 
 def sensor_grid(source: RasterSource, orientation: Orientation) -> SensorGrid:
     """Return the grid of an image that is located by its orientation."""
-    width, height = source.grid.width, source.grid.height
+    width, height = source.grid.size
     corners = np.array([[0, 0], [width, 0], [0, height]], float) - 0.5
     ground = orientation.rpc.localise(corners, orientation.heights.typical_m)
     origin, right, down = reproject(ground, LON_LAT, orientation.crs)

@@ -89,7 +89,7 @@ def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> P
     kind = DISTORTIONS[options.kind]
     terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
     # The frame's unit is half the longer side.
-    px = 2 / max(grid.width, grid.height)
+    px = 2 / max(grid.size)
     coefficients = np.zeros((terms, 2))
     azimuth = generator.uniform(0, 2 * math.pi)
     coefficients[0] = options.shift_px * px * np.array([math.cos(azimuth), math.sin(azimuth)])
@@ -147,7 +147,7 @@ class Positions:
         The exact inverse of the truth is taken at nodes; a bicubic spline through them returns any
         affine map exactly and gentle polynomials to far below a thousandth of a pixel.
         """
-        width, height = truth.input_grid.width, truth.input_grid.height
+        width, height = truth.input_grid.size
         nodes = _nodes(height), _nodes(width)
         places = _on_scene(truth, scene_grid, *nodes)
         rows, columns = (RectBivariateSpline(*nodes, place) for place in places)
@@ -161,7 +161,7 @@ class Positions:
     @classmethod
     def exact(cls, truth: Transform, scene_grid: Grid) -> Positions:
         """Return the same, taken one by one: terrain is rough."""
-        width, height = truth.input_grid.width, truth.input_grid.height
+        width, height = truth.input_grid.size
 
         def strip(start: int, stop: int) -> npt.NDArray[np.float64]:
             return _on_scene(truth, scene_grid, np.arange(start, stop), np.arange(width))

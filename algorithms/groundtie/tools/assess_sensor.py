@@ -119,7 +119,7 @@ def assess_sensor(
             if table is not None:
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
-                draw_vectors(outputs.stage(picture), points, errors, oriented.size)
+                draw_vectors(outputs.stage(picture), points, errors, oriented.source.grid.size)
     return SensorAssessment(errors, len(points), given_files({"table": table, "picture": picture}))
 
 

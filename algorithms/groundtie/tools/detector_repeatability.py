@@ -15,7 +15,7 @@ from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_csv, write_json
 from ..rasters.pair import ImagePair
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import bounded_cache
 from ..registration.opening import open_pair
 from ..registration.specification import Specification
@@ -194,8 +194,7 @@ def detector_repeatability(
 def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[Patch, Patch]:
     """Return the middle of the overlap in both images, the input resampled onto the reference."""
     grid = pair.grid
-    width, height = min(grid.width, largest), min(grid.height, largest)
-    piece = grid.window((grid.width - width) // 2, (grid.height - height) // 2, width, height)
+    piece = grid.window(*middle_window(grid, largest))
     reference = pair.reference_patch(piece)
     input = pair.input_patch(piece, pair.nominal_px if transform is None else transform)
     return reference, input
