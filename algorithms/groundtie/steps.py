@@ -8,7 +8,7 @@ the verdict on a model. Images are whatever the tools take: arrays, files, open 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -245,14 +245,14 @@ def _stages(
     reference: Any, input: Any, spec: Specification, context: Context | None
 ) -> Iterator[tuple[Stages, SceneInfo, Context]]:
     """Open a pair and put the stages of its registration together."""
-    if context is None:
-        with threads() as own, _stages(reference, input, spec, own) as found:
-            yield found
-        return
-    with bounded_cache(), open_pair(reference, input, spec, context.quiet()) as opened:
+    with (
+        threads() if context is None else nullcontext(context) as running,
+        bounded_cache(),
+        open_pair(reference, input, spec, running.quiet()) as opened,
+    ):
         scene = SceneInfo.of(opened.pair, spec.radar)
-        masked = mask_pair(opened, spec, scene, context.quiet())
-        yield Stages.of(opened.images, masked, spec), scene, context
+        masked = mask_pair(opened, spec, scene, running.quiet())
+        yield Stages.of(opened.images, masked, spec), scene, running
 
 
 def _patch(image: ArrayLike) -> Patch:

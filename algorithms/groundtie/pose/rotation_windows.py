@@ -10,7 +10,7 @@ from affine import Affine
 from ..errors import NoOverlapError, RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
-from ..geometry.models import Frame, PolynomialModel
+from ..geometry.models import shift_model
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
 from ..rasters.grid import FloatArray, Grid, apply_affine, compose
@@ -162,8 +162,7 @@ def _nominal(reference: Image, input: Image) -> Transform:
     if ref.grid.is_georeferenced:
         return Transform.nominal(ref.grid.crs, inp.grid)
     apart = np.subtract(inp.grid.centre_px, ref.grid.centre_px)
-    model = PolynomialModel("translation", Frame(Affine.identity()), apart[None])
-    return Transform(model, None, inp.grid)
+    return Transform(shift_model(*apart.tolist()), None, inp.grid)
 
 
 def _metric_frame(grid: Grid) -> Affine:
