@@ -31,7 +31,7 @@ def test_all_means_of_a_small_scene_are_taken(scene: Scene) -> None:
 def test_of_a_large_scene_tiles_along_diagonals_are_taken(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scene_module, "_TILE", 2 * FACTOR + 1)
+    monkeypatch.setattr(scene_module, "BLOCK", 2 * FACTOR + 1)
     taken = np.isin(np.arange(900), scene.sample(FACTOR, 200)).reshape(30, 30)
     tiles = taken.reshape(15, 2, 15, 2).mean(axis=(1, 3))
     tiles[0, 0] = 1  # of which a block is not valid

@@ -34,9 +34,6 @@ Select = Callable[[Window], Selection]
 # Pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
 
-# Side of the tiles of a sample, at most.
-_TILE = BLOCK
-
 
 @dataclass(frozen=True)
 class Scene:
@@ -91,7 +88,7 @@ class Scene:
         has as many.
         """
         step = max(self.grid.width * self.grid.height // (factor**2 * most), 1)
-        side = _TILE // factor * factor
+        side = BLOCK // factor * factor
         all_tiles = tiles(self.grid, side)
         some = [one for one in all_tiles if (one.row + one.col) // side % step == 0]
         parts = []

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.views import RADAR
 from .grid import Grid
 from .handles import read_by
 from .height_units import in_metres
 from .metadata import BandInfo
 from .reading import FloatImage, RasterSource, Window
 
-SUN, RADAR = "sun", "radar"
+SUN = "sun"
 LIGHTS = (SUN, RADAR)
 
 # Light from all the sky, as a share of the sun's on level ground; slopes that face the radar are

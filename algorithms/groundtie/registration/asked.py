@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import ParameterError
-from ..geometry.views import View, parse_view, split_views
+from ..geometry.views import RADAR, View, parse_view, split_views
 from ..kinds import AUTO
 from ..masks.used import NONE
-from ..rasters.rendered import LIGHTS, RADAR, SUN, Light
+from ..rasters.rendered import LIGHTS, SUN, Light
 from .registered_output import grid_of_output, model_for_grid
 from .specification import BOTH, Specification, StatedSurface
 from .user_masks import UserMask
