@@ -7,12 +7,11 @@ from affine import Affine
 from ..geometry.fitting import fit_model
 from ..geometry.models import Model
 from ..rasters.grid import Grid
-from ..rasters.grid import compose as composed
 
 
 def on_map(model: Model, grid: Grid) -> Model:
     """Return a model of a grid's pixel positions as one of map positions."""
-    return model.on_map(composed(grid.transform, Affine.translation(0.5, 0.5)))
+    return model.on_map(grid.centre_transform)
 
 
 def on_grid(model: Model, grid: Grid) -> Affine:
