@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ..masks.scene import Scene, Selection
+from ..rasters.grid import mesh
 from ..rasters.reading import FloatImage, Mask, Window
 from .classifier import FeatureClassifier
 from .patch_statistics import NO_BANDS, PATCH_PX
@@ -58,8 +59,7 @@ class ClassifiedScene:
         around = cells.widened(_MARGIN_PX)
         patch = self.scene.read(around)
         bands = self.bands(around) if self.classifier.bands else NO_BANDS
-        cols, rows = np.meshgrid(np.arange(across), np.arange(down))
-        middles = _MARGIN_PX + _CELL_PX * np.array([cols.ravel() + 0.5, rows.ravel() + 0.5]).T
+        middles = _MARGIN_PX + _CELL_PX * (mesh(np.arange(across), np.arange(down)) + 0.5)
         kept = self.classifier.keep(patch, middles, bands).reshape(down, across)
         pixels = kept.repeat(_CELL_PX, axis=0).repeat(_CELL_PX, axis=1)
         return pixels[window.slices_in(cells)], patch.valid[window.slices_in(around)]

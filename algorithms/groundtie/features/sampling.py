@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..rasters.grid import FloatArray
+from ..rasters.grid import FloatArray, mesh
 from ..rasters.reading import FloatImage
 from .keypoints import Keypoints
 from .scale_space import Gradient
@@ -14,8 +14,7 @@ from .scale_space import Gradient
 def square_lattice(half: float, count: int) -> FloatArray:
     """Return a lattice of count² positions (x, y) in the middle of the squares of ± half."""
     side = (np.arange(count) + 0.5) * (2 * half / count) - half
-    x, y = np.meshgrid(side, side)
-    return np.column_stack([x.ravel(), y.ravel()])
+    return mesh(side, side)
 
 
 def lattice_around(points: Keypoints, lattice: FloatArray) -> tuple[FloatArray, FloatArray]:

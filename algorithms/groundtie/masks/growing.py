@@ -68,12 +68,11 @@ def grow_regions(
             image, taken, (int(col), int(row)), 0, tolerance_db, tolerance_db, flags
         )
         window = Window(*box)
-        part = taken[window.row + 1 :, window.col + 1 :][: window.height, : window.width]
+        part = taken[1:, 1:][window.slices]
         mask = part == _GROWING
         part[mask] = _TAKEN
         if area >= smallest_px:
-            inside = level_db[window.row :, window.col :][: window.height, : window.width]
-            yield Region(window, mask, float(inside[mask].mean()))
+            yield Region(window, mask, float(level_db[window.slices][mask].mean()))
 
 
 def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:

@@ -141,9 +141,9 @@ def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tu
         if region.level_db < shadow_db and area_m2 < _LAKE_M2:
             continue
         if shape.length * pixel_m >= _LONG_M and shape.elongation >= _ELONGATION:
-            _add(longs, region)
+            longs[region.box.slices] |= region.mask
         if area_m2 >= _LARGE_M2 and shape.width * pixel_m > width_m:
-            _add(wide, region)
+            wide[region.box.slices] |= region.mask
     return longs, wide
 
 
@@ -166,11 +166,6 @@ def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:
     small = stats[:, cv2.CC_STAT_AREA] < smallest_px
     small[0] = False  # the mask itself
     return np.asarray((even > 0) | small[labels])
-
-
-def _add(mask: Mask, region: Region) -> None:
-    box = region.box
-    mask[box.row :, box.col :][: box.height, : box.width] |= region.mask
 
 
 def _smooth(patch: Patch) -> NDArray[np.float32]:
