@@ -73,6 +73,43 @@ def test_nodata_stays_and_weighs_nothing(tmp_path: Path) -> None:
         assert dataset.nodata == 7
 
 
+def masks(path: Path) -> np.ndarray:
+    """Return which pixels GDAL takes for valid."""
+    with rasterio.open(path) as dataset:
+        return dataset.read_masks() > 0
+
+
+@pytest.mark.parametrize("hole", [np.nan, np.inf])
+@pytest.mark.parametrize("dtype", ["float32", "complex64"])
+def test_holes_that_nothing_declares_stay_holes(tmp_path: Path, dtype: str, hole: float) -> None:
+    bands = np.stack([amplitude(), amplitude(1)]).astype(dtype)
+    bands[0, 100:120, 50:90] = hole
+    bands[1, 300:330, 400:420] = hole
+    path = write_raster(tmp_path / "in.tif", bands)
+    found = masks(filter_speckle(path, tmp_path / "out.tif", "lee", looks=LOOKS).output)
+    np.testing.assert_array_equal(found, np.isfinite(bands))
+
+
+@pytest.mark.parametrize("nodata", [0.0, 5.0])
+def test_holes_of_complex_images_stay_holes(tmp_path: Path, nodata: float) -> None:
+    image = (amplitude() * 1j).astype(np.complex64)
+    image[100:120, 50:90] = nodata
+    path = write_raster(tmp_path / "in.tif", image, nodata=nodata)
+    found = masks(filter_speckle(path, tmp_path / "out.tif", "lee", looks=LOOKS).output)
+    np.testing.assert_array_equal(found[0], image != nodata)
+
+
+def test_holes_of_one_band_cannot_be_stated_by_a_mask_of_all(tmp_path: Path) -> None:
+    bands = np.stack([amplitude(), amplitude(1)]).astype(np.float32)
+    bands[1, 300:330, 400:420] = np.nan
+    mask = np.full(SIZE, 255, np.uint8)
+    mask[:50] = 0
+    path = write_raster(tmp_path / "in.tif", bands, mask=mask)
+    with pytest.raises(ParameterError, match="at different pixels"):
+        filter_speckle(path, tmp_path / "out.tif", "lee", looks=LOOKS)
+    assert not (tmp_path / "out.tif").exists()
+
+
 def test_complex_pixels_become_amplitudes(tmp_path: Path) -> None:
     phase = np.exp(2j * np.pi * np.random.default_rng(3).random(SIZE))
     image = amplitude().astype(np.float32)

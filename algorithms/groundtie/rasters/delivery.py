@@ -21,6 +21,7 @@ from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import read_around, reduction, resample
 from .windows import Mask, Window
 from .writing import (
+    chosen_nodata,
     create_like,
     different_masks,
     fill_value,
@@ -60,7 +61,7 @@ class _Warp:
         resampling: str,
     ) -> _Warp:
         method = "nearest" if source.colormap else resampling
-        nodata = _choose_nodata(source)
+        nodata = chosen_nodata(source)
         if nodata is not None:
             require_fit(nodata, source.dtype)
         size = source.grid.size
@@ -275,13 +276,6 @@ def write_with_geotransform(
             file.write(values, window=tile, valid=mask)
             progress.update((i + 1) / count * (1 - _OVERVIEWS))
     progress.update(1.0)
-
-
-def _choose_nodata(source: RasterSource) -> float | None:
-    declared = shared_nodata(source)
-    if declared is not None or source.alpha_band or source.has_mask_band:
-        return declared
-    return float("nan") if source.dtype.kind == "f" else None
 
 
 def _is_covered(warp: _Warp) -> bool:

@@ -243,6 +243,18 @@ def shared_nodata(source: RasterSource) -> float | None:
     return next((value for value in declared if value is not None), None)
 
 
+def chosen_nodata(source: RasterSource) -> float | None:
+    """Return the nodata value that a raster's new pixels are written with, or None.
+
+    It is what the raster declares; NaN for real floating-point pixels if nothing else marks those
+    without data. Errors as `shared_nodata`.
+    """
+    declared = shared_nodata(source)
+    if declared is not None or source.alpha_band or source.has_mask_band:
+        return declared
+    return float("nan") if source.dtype.kind == "f" else None
+
+
 def different_masks(source: RasterSource) -> ParameterError:
     """Return the error that bands hold no data at different pixels, which one mask cannot tell."""
     return ParameterError(

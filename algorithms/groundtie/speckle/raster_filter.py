@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, require_workable, tile_count, tiles
-from ..rasters.writing import create_like, fill_value, shared_nodata
+from ..rasters.writing import chosen_nodata, create_like, different_masks, fill_value
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
 
@@ -45,17 +46,25 @@ class RasterFilter:
     filter: SpeckleFilter
     values: str
 
+    @cached_property
+    def like(self) -> RasterSource:
+        """What the result states of itself."""
+        source = _as_amplitudes(self.source) if self.source.is_complex else self.source
+        # Without speckle, only the tag identifies it as a radar image.
+        return with_speckle_filter(source, f"{self.filter.name}, {self.filter.window_px} px")
+
+    @cached_property
+    def nodata(self) -> float | None:
+        """The result's nodata value."""
+        return chosen_nodata(self.like)
+
     def write(self, path: Path, context: Context) -> None:
         """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
         source = self.source
         require_workable(source.grid, source.path)
-        like = _as_amplitudes(source) if source.is_complex else source
-        nodata = shared_nodata(like)
-        # Without speckle, only the tag identifies it as a radar image.
-        like = with_speckle_filter(like, f"{self.filter.name}, {self.filter.window_px} px")
         workers, masked = context.workers, source.has_mask_band
         with create_like(
-            like, source.grid, path, nodata=nodata, masked=masked, workers=workers
+            self.like, source.grid, path, nodata=self.nodata, masked=masked, workers=workers
         ) as file:
             filtered = in_order(
                 context.executor,
@@ -72,15 +81,15 @@ class RasterFilter:
         source, around = self.source, tile.widened(self.filter.reach_px)
         inside = tile.slices_in(around)
         values, valid = source.read_bands(around)
-        dtype = np.dtype(np.float32) if source.is_complex else values.dtype
-        out = np.empty((source.count, tile.height, tile.width), dtype)
+        # Nothing but a mask of all bands marks the pixels without data.
+        if self.nodata is None and source.alpha_band is None and (valid != valid[0]).any():
+            raise different_masks(source)
+        out = np.empty((source.count, tile.height, tile.width), self.like.dtype)
         for i in range(source.count):
-            out[i] = self._filtered(values[i], valid[i], i + 1, dtype)[inside]
+            out[i] = self._filtered(values[i], valid[i], i + 1)[inside]
         return out, valid[0][inside]
 
-    def _filtered(
-        self, values: NDArray[Any], valid: Mask, band: int, dtype: np.dtype[Any]
-    ) -> NDArray[Any]:
+    def _filtered(self, values: NDArray[Any], valid: Mask, band: int) -> NDArray[Any]:
         source = self.source
         if band == source.alpha_band:
             return values
@@ -88,17 +97,19 @@ class RasterFilter:
         filtered = self.filter(power, valid)
         if self.values == AMPLITUDE:
             filtered = np.sqrt(filtered)
-        filtered = rounded(filtered, dtype)
-        if source.is_complex:
-            return filtered
-        # Without a nodata value, an invalid pixel keeps its value.
-        nodata = source.bands[band - 1].nodata
-        fill = values if nodata is None else fill_value(source, nodata, band)
-        return np.where(valid, filtered, fill)
+        filtered = rounded(filtered, self.like.dtype)
+        if self.nodata is not None:
+            return np.where(valid, filtered, fill_value(self.like, self.nodata, band))
+        # Beside a mask an invalid pixel keeps its value, a complex one is 0.
+        return filtered if source.is_complex else np.where(valid, filtered, values)
 
 
 def _as_amplitudes(source: RasterSource) -> RasterSource:
-    bands = tuple(replace(band, dtype="float32", nodata=None) for band in source.bands)
+    # No number is free for nodata: amplitudes may be 0, and complex numbers may have any parts.
+    bands = tuple(
+        replace(band, dtype="float32", nodata=None if band.nodata is None else float("nan"))
+        for band in source.bands
+    )
     return replace(source, bands=bands)
 
 
