@@ -78,6 +78,14 @@ def test_invalid_pixels_are_0_and_weigh_nothing(name: str) -> None:
     assert not plain[~valid].any()
 
 
+@pytest.mark.parametrize("name", FILTERS)
+def test_nothing_beside_strong_scatterers_has_less_power_than_none(name: str) -> None:
+    image = np.zeros((200, 200), np.float32)
+    image[:150, :150] = speckled(np.ones((150, 150)), 1.0)
+    image[:100] *= 1e9
+    assert SpeckleFilter(name, 7, 1.0)(image, everywhere(image)).min() >= 0
+
+
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_tiles_leave_no_seams(name: str) -> None:
     image = speckled(np.ones((300, 530)), LOOKS)

@@ -99,6 +99,19 @@ def test_holes_of_complex_images_stay_holes(tmp_path: Path, nodata: float) -> No
     np.testing.assert_array_equal(found[0], image != nodata)
 
 
+@pytest.mark.parametrize("name", ["lee", "isef"])
+@pytest.mark.parametrize(("dtype", "nodata"), [("uint16", 1000), ("int32", 1000), ("uint8", 100)])
+def test_no_filtered_value_becomes_the_nodata_value(
+    tmp_path: Path, dtype: str, nodata: int, name: str
+) -> None:
+    image = np.rint(amplitude() * nodata / 1000).clip(0, 255 if dtype == "uint8" else None)
+    image[image == nodata] += 1
+    image[:20] = nodata
+    path = write_raster(tmp_path / "in.tif", image.astype(dtype), nodata=nodata)
+    out = filter_speckle(path, tmp_path / "out.tif", name, looks=LOOKS).output
+    np.testing.assert_array_equal(masks(out), masks(path))
+
+
 def test_holes_of_one_band_cannot_be_stated_by_a_mask_of_all(tmp_path: Path) -> None:
     bands = np.stack([amplitude(), amplitude(1)]).astype(np.float32)
     bands[1, 300:330, 400:420] = np.nan

@@ -71,7 +71,8 @@ class SpeckleFilter:
                 tile = _Tile(padded[around], counted[around], reach)
                 out[row : row + _TILE_PX, col : col + _TILE_PX] = FILTERS[self.name](self, tile)
         out[~valid] = 0
-        return out
+        # Sums that run on from strong scatterers leave a little less than nothing behind.
+        return np.maximum(out, np.float32(0), out=out)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, require_workable, tile_count, tiles
-from ..rasters.writing import chosen_nodata, create_like, different_masks, fill_value
+from ..rasters.writing import chosen_nodata, create_like, different_masks, fill_value, keep_apart
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
 
@@ -99,7 +99,9 @@ class RasterFilter:
             filtered = np.sqrt(filtered)
         filtered = rounded(filtered, self.like.dtype)
         if self.nodata is not None:
-            return np.where(valid, filtered, fill_value(self.like, self.nodata, band))
+            fill = fill_value(self.like, self.nodata, band)
+            keep_apart(filtered, fill)
+            return np.where(valid, filtered, fill)
         # Beside a mask an invalid pixel keeps its value, a complex one is 0.
         return filtered if source.is_complex else np.where(valid, filtered, values)
 
