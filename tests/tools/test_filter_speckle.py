@@ -14,6 +14,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.rasters.radar_tags import SPECKLE_FILTER, is_known_radar
 from groundtie.rasters.reading import open_raster
 from groundtie.speckle.filters import FILTERS, SpeckleFilter
+from groundtie.speckle.raster_filter import VALUES
 
 LOOKS = 4.0
 SIZE = (530, 610)
@@ -155,3 +156,23 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RasterContentError, match="no valid pixels"):
         filter_speckle(empty, tmp_path / "out.tif")
     assert not (tmp_path / "out.tif").exists()
+
+
+@pytest.mark.parametrize("values", VALUES)
+@pytest.mark.parametrize("dtype", ["float32", "int16"])
+def test_decibels_are_refused(tmp_path: Path, dtype: str, values: str) -> None:
+    decibels = (20 * np.log10(amplitude() / 1e4)).astype(dtype)
+    path = write_raster(tmp_path / "in.tif", decibels)
+    with pytest.raises(RasterContentError, match="below 0"):
+        filter_speckle(path, tmp_path / "out.tif", values=values)
+    assert not (tmp_path / "out.tif").exists()
+
+
+def test_a_negative_number_is_refused_wherever_it_is_unless_it_is_nodata(tmp_path: Path) -> None:
+    image = amplitude().astype(np.float32)
+    image[3, 5] = -9999
+    path = write_raster(tmp_path / "in.tif", image)
+    with pytest.raises(RasterContentError, match="below 0"):
+        filter_speckle(path, tmp_path / "out.tif")
+    filter_speckle(write_raster(path, image, nodata=-9999), tmp_path / "out.tif")
+    assert masks(tmp_path / "out.tif").sum() == image.size - 1

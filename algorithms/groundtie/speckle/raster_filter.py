@@ -59,7 +59,13 @@ class RasterFilter:
         return chosen_nodata(self.like)
 
     def write(self, path: Path, context: Context) -> None:
-        """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`."""
+        """Write the filtered raster, tile by tile; see `atomic.Outputs.stage`.
+
+        Raises
+        ------
+        RasterContentError
+            A valid pixel is below 0.
+        """
         source = self.source
         require_workable(source.grid, source.path)
         workers, masked = context.workers, source.has_mask_band
@@ -93,7 +99,7 @@ class RasterFilter:
         source = self.source
         if band == source.alpha_band:
             return values
-        power = _power(values, self.values)
+        power = _power(source, values, valid, self.values)
         filtered = self.filter(power, valid)
         if self.values == AMPLITUDE:
             filtered = np.sqrt(filtered)
@@ -115,8 +121,15 @@ def _as_amplitudes(source: RasterSource) -> RasterSource:
     return replace(source, bands=bands)
 
 
-def _power(pixels: NDArray[Any], values: str) -> NDArray[np.float32]:
+def _power(
+    source: RasterSource, pixels: NDArray[Any], valid: Mask, values: str
+) -> NDArray[np.float32]:
     """Return the power of pixels, float32."""
+    if not source.is_complex and np.min(pixels, where=valid, initial=0) < 0:
+        raise RasterContentError(
+            f"{source.path} has pixels below 0, which no amplitude or intensity is: make decibels "
+            "linear before, or declare the nodata value"
+        )
     if pixels.dtype.kind == "c":
         return np.asarray(pixels.real**2 + pixels.imag**2, np.float32)
     linear = np.clip(pixels.astype(np.float32), 0, _LARGEST_AMPLITUDE)
@@ -129,10 +142,11 @@ def looks_of(source: RasterSource, values: str) -> float:
     Raises
     ------
     RasterContentError
-        No pixel there is valid.
+        No pixel there is valid, or one is below 0.
     """
     middle = middle_window(source.grid)
     bands, valid = source.read_bands(middle, source.image_bands[:1])
     if not valid.any():
         raise RasterContentError(f"{source.path} has no valid pixels in its middle")
-    return estimate_looks(np.where(valid[0], _power(bands[0], values), np.float32(0)), valid[0])
+    power = _power(source, bands[0], valid[0], values)
+    return estimate_looks(np.where(valid[0], power, np.float32(0)), valid[0])
