@@ -217,6 +217,22 @@ def test_a_table_that_a_person_made(tmp_path: Path) -> None:
     assert found.is_check.tolist() == [False]
 
 
+TABLE = "reference_x,reference_y,input_col,input_row"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".points"])
+def test_a_row_with_more_fields_than_the_first_line_is_refused(tmp_path: Path, suffix: str) -> None:
+    """As of decimal commas, whose last one would cut the last number off."""
+    header = "mapX,mapY,sourceX,sourceY" if suffix == ".points" else TABLE
+    path = tmp_path / f"mine{suffix}"
+    path.write_text(f"{header}\n1,2,3,4\n1,2,3,4,5\n")
+    with pytest.raises(TransformFileError, match="row 2 has more fields than the first line"):
+        read_tie_points(path, PLAIN)
+    # Spreadsheets end each line with as many separators as the longest has.
+    path.write_text(f"{header}\n1,2,3,4,,\n")
+    assert len(read_tie_points(path, PLAIN)) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "text", "reason"),
     [

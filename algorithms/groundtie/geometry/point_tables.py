@@ -29,11 +29,17 @@ _FARTHEST = 1e10
 def table_rows(lines: Iterable[str]) -> list[Row]:
     """Return the rows of a CSV table by the names of its columns.
 
-    Fields beyond those of the first line are left out.
+    Raises
+    ------
+    ValueError
+        A row has more fields than the first line, other than empty ones.
     """
     rows = [dict(row) for row in csv.DictReader(lines)]
-    for row in rows:
-        row.pop(None, None)
+    for number, row in enumerate(rows, 1):
+        if any(field.strip() for field in row.pop(None, ())):
+            raise ValueError(
+                f"row {number} has more fields than the first line (is a comma the decimal sign?)"
+            )
     return rows
 
 
