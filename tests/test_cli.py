@@ -11,10 +11,12 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 import rasterio
@@ -266,6 +268,25 @@ def test_a_signal_cancels_in_one_line_and_leaves_nothing(number: signal.Signals)
     assert out == ""
     assert rest == "\r\x1b[Kgroundtie: error: cancelled; nothing was written\r\n"
     assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("started", [True, False])
+def test_a_second_signal_ends_in_one_line_what_takes_no_notice_of_the_first(
+    number: signal.Signals,
+    started: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def busy(*_: Any, **__: Any) -> Any:
+        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), number)
+        time.sleep(60)
+
+    if not started:
+        monkeypatch.setattr(click.Group, "parse_args", busy)
+    assert main(GOOD.split(), tools=[dataclasses.replace(TOY, run=busy)]) == 128 + number
+    assert capsys.readouterr() == ("", "groundtie: error: cancelled\n")
 
 
 def test_progress_is_for_terminals() -> None:

@@ -52,7 +52,7 @@ def main(args: Sequence[str] | None = None) -> int:
             code = command.main(args, prog_name="groundtie", standalone_mode=False, obj=received)
         except click.ClickException as error:
             return _fail(_usage(error), error.exit_code)
-        except (CancelledError, KeyboardInterrupt) as error:
+        except (CancelledError, _SecondSignal) as error:
             number = received[0] if received else signal.SIGINT
             return _fail(str(error) or "cancelled", 128 + number)
         except GroundTieError as error:
@@ -85,6 +85,10 @@ def _silence_libraries() -> None:
         warnings.simplefilter("ignore")
 
 
+class _SecondSignal(BaseException):
+    """Ends the work where it is; for an interrupt by the keyboard click would print a line."""
+
+
 @contextmanager
 def _signals() -> Iterator[list[int]]:
     """Collect SIGINT and SIGTERM in a list, so that work ends at its next step and cleans up.
@@ -95,7 +99,7 @@ def _signals() -> Iterator[list[int]]:
 
     def handle(number: int, frame: object) -> None:
         if received:
-            raise KeyboardInterrupt
+            raise _SecondSignal
         received.append(number)
 
     previous = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
