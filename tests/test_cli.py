@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import logging
 import os
@@ -138,6 +139,24 @@ def test_a_number_that_json_does_not_know_is_a_bug(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(toys.ToyResult, "summary", lambda self: {"error": float("nan")})
     with pytest.raises(ValueError, match="JSON"):
         run(f"{GOOD} --json")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is full, in Linux")
+@pytest.mark.parametrize("words", [GOOD, f"{GOOD} --json", ""])
+@pytest.mark.parametrize("unbuffered", ["1", ""])
+def test_a_full_disk_behind_standard_output_is_one_line(words: str, unbuffered: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, toys.__file__, *words.split()],
+            env={**ENVIRONMENT, "PYTHONUNBUFFERED": unbuffered},
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    reason = os.strerror(errno.ENOSPC)
+    assert done.stderr == f"groundtie: error: cannot write to standard output: {reason}\n"
+    assert done.returncode == 2
 
 
 def test_help_lists_the_tools(capsys: pytest.CaptureFixture[str]) -> None:

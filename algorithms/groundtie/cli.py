@@ -6,6 +6,7 @@ Standard output carries the result alone. An error is one line on standard error
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -21,7 +22,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from .declaration import Parameter, Tool
-from .errors import CancelledError, GroundTieError, NotRegisteredError
+from .errors import CancelledError, GroundTieError, NotRegisteredError, OutputError
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
 from .packages import use_one_thread
@@ -176,7 +177,7 @@ def _before_command(
     context: click.Context, verbose: bool, memory: str | None, workers: str | None
 ) -> None:
     if context.invoked_subcommand is None:
-        click.echo(context.get_help())
+        _print(context.get_help())
     if verbose:
         context.with_resource(_log_to(sys.stderr))
     if memory is not None:
@@ -244,12 +245,12 @@ class ToolCommand(click.Command):
                 result = self.tool.run(**checked, progress=progress)
         except NotRegisteredError as error:
             if as_json and error.verdict is not None:
-                _echo_json(error.summary())
+                _print_json(error.summary())
             raise
         if as_json:
-            _echo_json(result.summary())
+            _print_json(result.summary())
         else:
-            click.echo("\n".join(result.lines()))
+            _print("\n".join(result.lines()))
         return getattr(result, "exit_code", 0)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -354,9 +355,27 @@ def _describe(parameter: Parameter) -> str:
     return f"{parameter.kind.help}  [{'; '.join(notes)}]" if notes else parameter.kind.help
 
 
-def _echo_json(values: dict[str, Any]) -> None:
+def _print_json(values: dict[str, Any]) -> None:
     # NaN and infinity are not JSON: better no result than one that other programs cannot read
-    click.echo(json.dumps(values, indent=2, allow_nan=False))
+    _print(json.dumps(values, indent=2, allow_nan=False))
+
+
+def _print(text: str) -> None:
+    """Write a text to standard output.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    try:
+        click.echo(text)
+    except OSError as error:
+        if error.errno == errno.EPIPE:
+            raise  # who reads it has seen enough: click ends the program
+        # What is left of it, Python would try to write once more when it ends.
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+        raise OutputError(f"cannot write to standard output: {error.strerror or error}") from error
 
 
 @contextmanager
