@@ -24,6 +24,7 @@ DEGREES = Grid(Affine(1e-4, 0, 9.0, 0, -1e-4, 45.15), CRS.from_epsg(4326), 400, 
 PLAIN = Grid(PIXEL_COORDINATES, None, 400, 300)
 CASES = [(UTM, GRID), (UTM, DEGREES), (None, PLAIN), (UTM, PLAIN)]
 FORMATS = (".gpkg", ".geojson", ".csv", ".points")
+TABLE = "reference_x,reference_y,input_col,input_row"
 SHIFT = np.array([20.0, -30.0])
 
 
@@ -181,6 +182,47 @@ def test_an_old_georeferencer_file(tmp_path: Path) -> None:
     assert found.crs is None
 
 
+@pytest.mark.parametrize(
+    ("field", "enabled"), [(",1", True), (", 1", True), (",0", False), (",", False), ("", True)]
+)
+def test_which_points_are_enabled_as_in_qgis(tmp_path: Path, field: str, enabled: bool) -> None:
+    """It takes whole numbers, an empty field for 0, and a row that ends before for enabled."""
+    path = tmp_path / "image.points"
+    path.write_text(f"mapX,mapY,sourceX,sourceY,enable\n1,2,10.5,-20.5{field}\n")
+    assert read_tie_points(path, PLAIN).used.tolist() == [enabled]
+
+
+@pytest.mark.parametrize("word", ["false", "no", "0.0", "2", "True"])
+def test_other_words_for_enabled_are_refused(tmp_path: Path, word: str) -> None:
+    path = tmp_path / "image.points"
+    path.write_text(f"mapX,mapY,sourceX,sourceY,enable\n1,2,10.5,-20.5,{word}\n")
+    with pytest.raises(TransformFileError, match=f"enable must be 1 or 0, not '{word}'"):
+        read_tie_points(path, PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("word", "is_check", "states_fit"),
+    [
+        ("check", True, False),
+        (" Check", True, False),
+        ("CHECK ", True, False),
+        ("Fit", False, True),
+        ("", False, False),
+    ],
+)
+def test_the_role_of_a_point(tmp_path: Path, word: str, is_check: bool, states_fit: bool) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text(f"{TABLE},role\n1,2,3,4,{word}\n")
+    found = read_tie_points(path, PLAIN)
+    assert (found.is_check.tolist(), found.states_fit) == ([is_check], states_fit)
+
+
+def test_other_roles_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text(f"{TABLE},role\n1,2,3,4,fit\n1,2,3,4,chk\n")
+    with pytest.raises(TransformFileError, match="role must be fit or check, not 'chk'"):
+        read_tie_points(tmp_path / "mine.csv", PLAIN)
+
+
 def test_what_we_write_for_the_georeferencer(tmp_path: Path) -> None:
     points, transform = made(UTM, PLAIN)
     write_tie_points(tmp_path / "a.points", points, transform)
@@ -215,9 +257,6 @@ def test_a_table_that_a_person_made(tmp_path: Path) -> None:
     assert found.crs == UTM
     assert found.used.tolist() == [True]
     assert found.is_check.tolist() == [False]
-
-
-TABLE = "reference_x,reference_y,input_col,input_row"
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".points"])

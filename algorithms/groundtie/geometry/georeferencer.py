@@ -9,7 +9,7 @@ from affine import Affine
 from rasterio.crs import CRS
 
 from ..rasters.grid import Grid, require_map
-from .point_tables import positions, require_places, table_rows
+from .point_tables import Row, positions, require_places, table_rows
 from .tie_points import USED, TiePoints
 from .transform import Transform
 
@@ -35,7 +35,13 @@ def write_georeferencer(path: Path, points: TiePoints, transform: Transform) -> 
 
 
 def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
-    """Read points of the Georeferencer; without a CRS line their map is in the raster's CRS."""
+    """Read points of the Georeferencer; without a CRS line their map is in the raster's CRS.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        The table cannot be understood.
+    """
     crs = input_grid.crs
     lines = path.read_text(encoding="utf-8-sig").splitlines()
     while lines and lines[0].startswith("#"):
@@ -46,11 +52,23 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     # Older versions of QGIS called the columns so.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
     input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))
-    # As in QGIS, a point of which nothing is said is enabled.
-    enabled = [(row.get("enable") or "1").strip() for row in rows]
-    states = ["rejected: disabled" if word == "0" else USED for word in enabled]
+    states = [USED if _is_enabled(row) else "rejected: disabled" for row in rows]
     reference_xy = require_places(positions(rows, "mapX", "mapY"))
     return TiePoints.unmeasured(reference_xy, input_px, crs, states)
+
+
+def _is_enabled(row: Row) -> bool:
+    """Return whether a point takes part in the fit.
+
+    QGIS (`QgsGCPList::loadGcps`) enables points of rows that end before, and takes an empty field
+    for 0. It does so with words, too, which nobody means who writes "true".
+    """
+    word = row.get("enable")
+    if word is None:
+        return True
+    if word.strip() not in ("1", "0", ""):
+        raise ValueError(f"enable must be 1 or 0, not {word!r}")
+    return bool(word.strip() == "1")
 
 
 def _source_grid(input_grid: Grid) -> Grid:

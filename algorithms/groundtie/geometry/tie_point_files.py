@@ -44,6 +44,7 @@ SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
 _LAYER = "tie_points"
 EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
+_ROLES = ("fit", "check", "")
 
 
 def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform: Transform) -> None:
@@ -218,7 +219,7 @@ def _from_rows(
     """Return the points of a table."""
     # A drawn line has empty columns.
     states = [str(row.get("state") or USED) for row in rows]
-    roles = [row.get("role") for row in rows]
+    roles = [_role(row) for row in rows]
     sigma = columns(rows, *SIGMA)
     points = TiePoints.unmeasured(
         require_places(positions(rows, *REFERENCE)),
@@ -235,6 +236,15 @@ def _from_rows(
         more={name: numbers(rows, name) for name in more},
         states_fit="fit" in roles,
     )
+
+
+def _role(row: Row) -> str:
+    """Return the role of a point; an empty text if none is stated."""
+    stated = str(row.get("role") or "")
+    role = stated.strip().lower()
+    if role not in _ROLES:
+        raise ValueError(f"role must be fit or check, not {stated!r}")
+    return role
 
 
 def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
