@@ -79,6 +79,8 @@ def test_values_come_out_in_their_proper_type(kind: Kind, value: Any, expected: 
         (NUMBER, True, "size must be a number, not True"),
         (NUMBER, None, "size must be a number, not None"),
         (NUMBER, math.nan, "size must be a finite number, not nan"),
+        (NUMBER, "1_0", "size must be a number, not '1_0'"),
+        (NUMBER, "٣", "size must be a number, not '٣'"),
         (Number(**TEXTS), math.inf, "size must be a finite number, not inf"),
         (WHOLE, 1.5, "size must be a whole number, not 1.5"),
         (WHOLE, -1, "size must be at least 0, not -1"),

@@ -13,6 +13,7 @@ from typing import Any
 from .errors import GroundTieError, ParameterError
 from .raster_names import raster_name
 from .stac_items import raster_of_item
+from .tables import plain_number
 
 # The choice, of a model or a mask as of anything else, that the data decide.
 AUTO = "auto"
@@ -218,7 +219,7 @@ class Number(Kind):
         try:
             if isinstance(value, bool):
                 raise TypeError
-            number = float(value)
+            number = plain_number(value)
         except (TypeError, ValueError, OverflowError):
             raise ParameterError(f"{name} must be a number, not {value!r}") from None
         if not math.isfinite(number):

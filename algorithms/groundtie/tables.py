@@ -35,6 +35,19 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
+def plain_number(value: Any) -> float:
+    """Return the number that a cell holds, which other programs read alike.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It holds none; Python alone takes `1_000`, and digits of other scripts, for numbers.
+    """
+    if isinstance(value, str) and ("_" in value or not value.isascii()):
+        raise ValueError(f"{value!r} is no number")
+    return float(value)
+
+
 def _read_csv(path: Path) -> list[dict[str, Any]]:
     with path.open(newline="", encoding="utf-8-sig") as file:
         header = file.readline()

@@ -217,6 +217,19 @@ def test_the_role_of_a_point(tmp_path: Path, word: str, is_check: bool, states_f
     assert (found.is_check.tolist(), found.states_fit) == ([is_check], states_fit)
 
 
+@pytest.mark.parametrize("number", ["1_000", "٣", "１２"])
+@pytest.mark.parametrize("column", [0, 2, 4])
+def test_numbers_as_only_python_writes_them_are_refused(
+    tmp_path: Path, number: str, column: int
+) -> None:
+    row = ["1", "2", "3", "4", "5"]
+    row[column] = number
+    path = tmp_path / "mine.csv"
+    path.write_text(f"{TABLE},score\n{','.join(row)}\n", encoding="utf-8")
+    with pytest.raises(TransformFileError, match=f"'{number}' is no number"):
+        read_tie_points(path, PLAIN)
+
+
 def test_other_roles_are_refused(tmp_path: Path) -> None:
     (tmp_path / "mine.csv").write_text(f"{TABLE},role\n1,2,3,4,fit\n1,2,3,4,chk\n")
     with pytest.raises(TransformFileError, match="role must be fit or check, not 'chk'"):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..rasters.grid import FloatArray
+from ..tables import plain_number
 
 Row = dict[str, Any]
 
@@ -51,7 +52,9 @@ def columns(rows: list[Row], x: str, y: str) -> FloatArray:
 def numbers(rows: list[Row], name: str) -> FloatArray:
     """Return a column of numbers, shape (n,); NaN where a row has none."""
     values = [row.get(name) for row in rows]
-    return np.array([np.nan if value in (None, "") else float(value) for value in values], float)
+    return np.array(
+        [np.nan if value in (None, "") else plain_number(value) for value in values], float
+    )
 
 
 def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
@@ -62,7 +65,8 @@ def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
     KeyError, TypeError, ValueError
         A row has none.
     """
-    return np.array([[float(row[x]), float(row[y])] for row in rows], float).reshape(-1, 2)
+    places = [[plain_number(row[x]), plain_number(row[y])] for row in rows]
+    return np.array(places, float).reshape(-1, 2)
 
 
 def require_places(places: FloatArray) -> FloatArray:
