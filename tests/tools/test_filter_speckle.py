@@ -61,6 +61,32 @@ def test_intensities_are_not_squared(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(result.output)[0], expected, rtol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["lee", "isef"])
+@pytest.mark.parametrize("values", VALUES)
+@pytest.mark.parametrize(
+    ("dtype", "exponent"),
+    [("float32", -70), ("float32", 110), ("float64", -900), ("float64", 1000), ("complex64", 50)],
+)
+def test_results_do_not_depend_on_the_unit_of_the_pixels(
+    tmp_path: Path, dtype: str, exponent: int, values: str, name: str
+) -> None:
+    image = amplitude()[:200, 200:400].astype(dtype)
+    results = []
+    for scale in (1.0, 2.0**exponent):
+        path = write_raster(tmp_path / "in.tif", (image * scale).astype(dtype))
+        result = filter_speckle(path, tmp_path / "out.tif", name, values=values)
+        unit = scale**2 if dtype == "complex64" and values == "intensity" else scale
+        results.append((read(result.output) / unit, result.looks, result.looks_after))
+    np.testing.assert_array_equal(results[1][0], results[0][0])
+    assert results[1][1:] == results[0][1:]
+
+
+def test_messages_name_the_final_file(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "in.tif", np.full((40, 40), np.nan, np.float32))
+    with pytest.raises(RasterContentError, match=r"/out\.tif has no valid pixels in its middle"):
+        filter_speckle(path, tmp_path / "out.tif", looks=LOOKS)
+
+
 def test_nodata_stays_and_weighs_nothing(tmp_path: Path) -> None:
     image = np.rint(amplitude()).astype(np.uint16)
     image[100:200, 50:90] = 7

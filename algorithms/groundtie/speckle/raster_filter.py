@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import RasterContentError
-from ..rasters.metadata import rounded
+from ..rasters.hidden_files import final_name
+from ..rasters.metadata import rounded, working_dtype
 from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
@@ -23,9 +25,6 @@ from .statistics import estimate_looks
 
 AMPLITUDE = "amplitude"
 VALUES = (AMPLITUDE, "intensity")
-
-# Filters work in float32; its power must not overflow.
-_LARGEST_AMPLITUDE = 1e18
 
 
 @dataclass(frozen=True)
@@ -99,11 +98,14 @@ class RasterFilter:
         source = self.source
         if band == source.alpha_band:
             return values
-        power = _power(source, values, valid, self.values)
+        power, unit = _power(source, values, valid, self.values)
         filtered = self.filter(power, valid)
         if self.values == AMPLITUDE:
             filtered = np.sqrt(filtered)
-        filtered = rounded(filtered, self.like.dtype)
+        elif source.is_complex:
+            unit *= unit
+        dtype = self.like.dtype
+        filtered = rounded(np.multiply(filtered, unit, dtype=working_dtype(dtype)), dtype)
         if self.nodata is not None:
             fill = fill_value(self.like, self.nodata, band)
             keep_apart(filtered, fill)
@@ -123,17 +125,28 @@ def _as_amplitudes(source: RasterSource) -> RasterSource:
 
 def _power(
     source: RasterSource, pixels: NDArray[Any], valid: Mask, values: str
-) -> NDArray[np.float32]:
-    """Return the power of pixels, float32."""
-    if not source.is_complex and np.min(pixels, where=valid, initial=0) < 0:
+) -> tuple[NDArray[np.float32], float]:
+    """Return the power of pixels, and the unit of their amplitude or intensity that it is in.
+
+    Filters compute squares of the power in single precision: in a unit of about the largest pixel
+    none of them overflows. As it is a power of two, results are the same in any.
+    """
+    known = np.where(valid, pixels, pixels.dtype.type(0))
+    parts = (known.real, known.imag) if source.is_complex else (known,)
+    least, largest = float(min(map(np.min, parts))), float(max(map(np.max, parts)))
+    if not source.is_complex and least < 0:
         raise RasterContentError(
             f"{source.path} has pixels below 0, which no amplitude or intensity is: make decibels "
             "linear before, or declare the nodata value"
         )
-    if pixels.dtype.kind == "c":
-        return np.asarray(pixels.real**2 + pixels.imag**2, np.float32)
-    linear = np.clip(pixels.astype(np.float32), 0, _LARGEST_AMPLITUDE)
-    return linear * linear if values == AMPLITUDE else linear
+    unit = math.ldexp(1.0, math.frexp(max(largest, -least))[1] - 1)
+    dtype = working_dtype(known.real.dtype)
+    linear, *others = (
+        np.divide(part, unit, dtype=dtype).astype(np.float32, copy=False) for part in parts
+    )
+    if not source.is_complex and values != AMPLITUDE:
+        return linear, unit
+    return sum((part * part for part in others), linear * linear), unit
 
 
 def looks_of(source: RasterSource, values: str) -> float:
@@ -147,6 +160,7 @@ def looks_of(source: RasterSource, values: str) -> float:
     middle = middle_window(source.grid)
     bands, valid = source.read_bands(middle, source.image_bands[:1])
     if not valid.any():
-        raise RasterContentError(f"{source.path} has no valid pixels in its middle")
-    power = _power(source, bands[0], valid[0], values)
-    return estimate_looks(np.where(valid[0], power, np.float32(0)), valid[0])
+        name = final_name(source.path)
+        raise RasterContentError(f"{name} has no valid pixels in its middle")
+    power, _ = _power(source, bands[0], valid[0], values)
+    return estimate_looks(power, valid[0])
