@@ -77,6 +77,15 @@ def test_another_pixel_size_gives_borders_at_its_multiples() -> None:
     assert found.contains(found.map_to_pixel(turned.pixel_to_map(turned.outline()))).all()
 
 
+@pytest.mark.parametrize("grid", [GRID, Grid(PIXEL_COORDINATES, None, 40, 30)])
+def test_pixels_larger_than_the_whole_raster_are_refused(grid: Grid) -> None:
+    longest = 40 * grid.pixel_size_m
+    assert registered_grid(grid, grid.pixel_to_map, grid.crs, longest).width <= 2
+    for size in (1.01 * longest, 1e308):
+        with pytest.raises(GridSizeError, match="larger than the whole raster"):
+            registered_grid(grid, grid.pixel_to_map, grid.crs, size)
+
+
 def test_another_crs_keeps_the_size_of_the_pixels() -> None:
     to_degrees = lambda px: reproject(GRID.pixel_to_map(px), UTM, WGS84)  # noqa: E731
     found = registered_grid(GRID, to_degrees, WGS84)

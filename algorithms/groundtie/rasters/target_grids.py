@@ -89,7 +89,8 @@ def registered_grid(
     NoOverlapError
         The raster lies outside of the domain of the CRS.
     GridSizeError
-        The transform stretches the raster out of all proportion, or the pixels are too many.
+        The transform stretches the raster out of all proportion, or the pixels are too many or
+        larger than all of it.
     """
     usual = _registered_grid(input_grid, px_to_map, crs, None)
     stretch = np.hypot(*usual.size) / np.hypot(*input_grid.size)
@@ -100,6 +101,8 @@ def registered_grid(
         )
     if pixel_size_m is None:
         return usual
+    if pixel_size_m > np.max(np.multiply(usual.pixel_sides_m, (usual.width, usual.height))):
+        raise GridSizeError(f"a pixel size of {pixel_size_m:.6g} is larger than the whole raster")
     return _registered_grid(input_grid, px_to_map, crs, pixel_size_m)
 
 
