@@ -34,3 +34,21 @@ def test_without_a_percentage_all_valid_pixels_take_part(tmp_path: Path) -> None
     assert result.share == 1.0
     with rasterio.open(result.files["mask"]) as dataset:
         np.testing.assert_array_equal(dataset.read(1), image)
+
+
+@pytest.mark.parametrize(
+    ("high", "low", "words"),
+    [
+        (20, 0, "block means of at most 12.2"),
+        (0, 20, "block means of at least 3.8"),
+        (20, 20, "block means of 3.8 to 12.2"),
+        (0, 0, "all block means"),
+    ],
+)
+def test_which_means_take_part_in_words(
+    tmp_path: Path, high: float, low: float, words: str
+) -> None:
+    # Means of 1 to 15: their percentiles of 20 and 80 are 3.8 and 12.2.
+    image = np.arange(1, 16, dtype=np.float32).repeat(4)[None].repeat(4, axis=0)
+    path = write_raster(tmp_path / "in.tif", image)
+    assert mask_threshold(path, tmp_path / "mask.tif", high, low).lines()[0].endswith(f"; {words}")

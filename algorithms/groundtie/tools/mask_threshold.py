@@ -42,5 +42,13 @@ def mask_threshold(
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
     limits = {"low": mask.low, "high": mask.high}
     finite = {name: at if math.isfinite(at) else None for name, at in limits.items()}
-    words = f"block means of {mask.low:g} to {mask.high:g}"
+    words = _in_words(finite["low"], finite["high"])
     return WrittenMask(share, finite, words, given_files({"mask": output}))
+
+
+def _in_words(low: float | None, high: float | None) -> str:
+    if low is None:
+        return "all block means" if high is None else f"block means of at most {high:g}"
+    if high is None:
+        return f"block means of at least {low:g}"
+    return f"block means of {low:g} to {high:g}"
