@@ -10,9 +10,11 @@ from raster_files import UTM, utm_grid
 from textured_pairs import texture
 
 from groundtie import Raster, steps
-from groundtie.errors import ParameterError, TooFewPointsError
+from groundtie.errors import NoOverlapError, ParameterError, TooFewPointsError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.pair import ImagePair
+from groundtie.registration.evidence import RegistrationEvidence
 
 SIZE = 384
 MARGIN = 20
@@ -115,6 +117,21 @@ class TestFromImagesToVerdict:
         assert verdict.accepted
         assert verdict.fit_points_used == fit.inliers.sum()
         assert verdict.check_rmse_px < 0.5
+
+    @pytest.mark.slow
+    def test_few_check_points_need_those_of_the_exchanged_pair(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def nothing(_: ImagePair) -> ImagePair:
+            raise NoOverlapError("not there")
+
+        reference, input = pair(noise=0.8)
+        points = steps.match_chips(reference, input)
+        right = fit_model("translation", points.reference_xy, points.reference_xy + SHIFT)
+        monkeypatch.setattr(RegistrationEvidence, "needs_second_confirmation", True)
+        assert steps.judge(reference, input, right, points).accepted
+        monkeypatch.setattr(ImagePair, "exchanged", nothing)
+        assert steps.judge(reference, input, right, points).rule == "exchanged roles"
 
     @pytest.mark.slow
     def test_a_wrong_model_is_refused(self) -> None:

@@ -28,12 +28,11 @@ from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
 from .registration.opening import open_pair
-from .registration.pipeline import mask_pair
+from .registration.pipeline import judge_estimate, mask_pair
 from .registration.scene import SceneInfo
 from .registration.specification import COREGISTER, Specification
 from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
-from .registration.verdict import judge as judge_evidence
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
 from .similarity.surface import SimilaritySettings, Surface, describe
@@ -233,11 +232,10 @@ def judge(
         try:
             without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
             estimate = Estimate(transform, points, without_blocks)
-            check = stages.check(estimate, running)
-            surveys = stages.survey(estimate, scene, running)
+            check = stages.check(model, running)
+            return judge_estimate(stages, estimate, check, scene, running)[1]
         except TooFewPointsError as error:
             return judge_search(error)
-        return judge_evidence(stages.evidence(estimate, check, surveys, scene))
 
 
 @contextmanager

@@ -47,7 +47,7 @@ from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
 from groundtie.registration.evidence import (
-    Exchanged,
+    Agreement,
     ImagesEvidence,
     RegistrationEvidence,
     SearchEvidence,
@@ -111,6 +111,13 @@ def assessed(
     return AssessmentEvidence("check points", points, 3.0, misses_px)
 
 
+def of_nine(agreeing: int) -> Agreement:
+    """Return how nine points agree of which so many are inliers."""
+    return evidence(
+        np.concatenate([scatter(agreeing, 0.3), np.full((9 - agreeing, 2), 9.0)])
+    ).held_out
+
+
 NOWHERE = np.array([[np.nan, 0.0]])
 
 
@@ -162,8 +169,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(np.concatenate([scatter(20, 0.3), fallen(52)])),
     ),
     "exchanged roles": (
-        evidence(GOOD, exchanged=Exchanged(3, 9, -3.9, 0.4)),
-        evidence(GOOD, exchanged=Exchanged(4, 9, -4.1, 0.4)),
+        evidence(GOOD, exchanged=of_nine(3)),
+        evidence(GOOD, exchanged=of_nine(4)),
     ),
     "error at held-out points": (
         evidence(scatter(72, 0.9), max_error_px=1.0),

@@ -29,7 +29,7 @@ from scipy.stats import binom
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
-from groundtie.registration.evidence import Exchanged, ImagesEvidence, RegistrationEvidence
+from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
 
@@ -295,17 +295,17 @@ def test_what_chance_explains_with_less_than_its_squared_limit_needs_no_second_p
 
 
 @pytest.mark.parametrize(
-    ("exchanged", "is_refused"),
+    ("errors", "is_refused"),
     [
-        (Exchanged(9, 9, -16.0, 1.9), False),
-        (Exchanged(9, 9, -16.0, 2.1), True),
-        (Exchanged(9, 9, -16.0, math.nan), True),
-        (Exchanged(), True),
+        (np.full((9, 2), 1.3), False),
+        (np.full((9, 2), 1.5), True),
+        (np.full((9, 2), np.nan), True),
+        (np.zeros((0, 2)), True),
     ],
-    ids=["near", "far", "nowhere", "nothing found"],
+    ids=["within 2 px", "beyond", "nowhere", "nothing found"],
 )
-def test_an_exchanged_pair_must_show_the_same_transform(
-    exchanged: Exchanged, is_refused: bool
+def test_points_of_the_exchanged_pair_must_agree_with_the_transform(
+    errors: np.ndarray, is_refused: bool
 ) -> None:
-    found = evidence(GOOD, max_error_px=3.0, exchanged=exchanged)
+    found = evidence(GOOD, exchanged=evidence(errors).held_out)
     assert refusing(found) == (["exchanged roles"] if is_refused else [])

@@ -101,6 +101,20 @@ class TiePoints:
         nominal = grid.map_to_pixel(self.nominal_xy(transform))
         return nominal - grid.map_to_pixel(transform.model(self.reference_xy))
 
+    def exchanged(self, reference_grid: Grid, input_grid: Grid) -> TiePoints:
+        """Return the points, found with the roles of the images exchanged, in their own roles.
+
+        Parameters
+        ----------
+        reference_grid, input_grid
+            The georeferencing of the images, in their own roles.
+        """
+        return replace(
+            self,
+            reference_xy=reference_grid.pixel_to_map(self.input_px),
+            input_px=input_grid.map_to_pixel(self.reference_xy),
+        )
+
     def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:
         """Return the table with the points `which`, if they were used, rejected for a reason."""
         state = self.state.astype(object)

@@ -191,27 +191,6 @@ class EvidenceOfPoints(Evidence, Protocol):
 
 
 @dataclass(frozen=True)
-class Exchanged:
-    """What a registration with the images' roles exchanged shows.
-
-    Parameters
-    ----------
-    agreeing, total
-        How many of its check points agree with it, and how many there are.
-    log10_chance
-        log10 of the probability that random matches would agree as well.
-    apart_px
-        How far its transform lies from the inverse of the other (root mean square), in matching
-        pixels; infinite if it has none.
-    """
-
-    agreeing: int = 0
-    total: int = 0
-    log10_chance: float = 0.0
-    apart_px: float = math.inf
-
-
-@dataclass(frozen=True)
 class RegistrationEvidence:
     """What is known of a registration that came as far as check points.
 
@@ -239,7 +218,7 @@ class RegistrationEvidence:
     input_fit
         How well a surface model fits the registered input; None: nothing is expected of it.
     exchanged
-        What a registration with the images' roles exchanged shows; None: nobody asked for it.
+        How check points of the pair with exchanged roles agree; None: nobody asked for them.
     """
 
     estimate: Estimate
@@ -252,7 +231,7 @@ class RegistrationEvidence:
     mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
     surveys: Surveys = field(default_factory=Surveys)
     input_fit: ModelFit | None = None
-    exchanged: Exchanged | None = None
+    exchanged: Agreement | None = None
 
     stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
     judged: ClassVar = "the registration"

@@ -6,16 +6,21 @@ registers is a preset of it, so what one refuses, all refuse.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from ..context import Context
 from ..errors import NoOverlapError, NothingFoundError, TooFewPointsError
+from ..geometry.estimation import Estimate
+from ..geometry.tie_points import TiePoints
+from ..geometry.transform import Transform
 from ..masks.used import NONE, MaskUsed
-from ..matching.surveys import Surveys
+from ..matching.check import Check
+from ..matching.surface_fit import FIT_RADIUS_PX
 from ..rasters.reading import bounded_cache
-from .evidence import Exchanged, ImagesEvidence, RegistrationEvidence
+from .evidence import Agreement, ImagesEvidence, RegistrationEvidence
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
 from .registration import Registration
@@ -23,7 +28,7 @@ from .scene import SceneInfo
 from .specification import Specification
 from .stages import Stages
 from .surface_masks import with_surface_mask
-from .verdict import NOT_JUDGED, decide, judge, judge_search
+from .verdict import NOT_JUDGED, Verdict, decide, judge, judge_search
 
 
 def run(
@@ -98,22 +103,46 @@ def _register_once(
     stages = Stages.of(opened.images, masked, spec)
     try:
         estimate, check = stages.checked(context.part(0.0, 0.9))
-        surveys = stages.survey(estimate, scene, context.part(0.9, 1.0))
+        evidence, verdict = judge_estimate(stages, estimate, check, scene, context.part(0.9, 1.0))
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(error))
+    return replace(result, verdict=verdict, check=check, evidence=evidence)
+
+
+def judge_estimate(
+    stages: Stages, estimate: Estimate, check: Check, scene: SceneInfo, context: Context
+) -> tuple[RegistrationEvidence, Verdict]:
+    """Return the evidence and the verdict on an estimate, wherever it comes from.
+
+    Parameters
+    ----------
+    stages
+        Of the pair.
+    estimate, check
+        The model, and the check points around it.
+    scene
+        What the images are.
+    context
+        Threads and progress.
+
+    Raises
+    ------
+    TooFewPointsError
+        A mask leaves too few pixels to match.
+    """
+    surveys = stages.survey(estimate, scene, context)
     evidence = stages.evidence(estimate, check, surveys, scene)
     verdict = judge(evidence)
-    if verdict.accepted and _asks_for_exchange(evidence, scene, spec):
-        exchanged = _exchanged(opened, masked, scene, spec, evidence, context.quiet())
-        evidence = replace(evidence, exchanged=exchanged)
+    if verdict.accepted and _asks_for_exchange(evidence, scene, stages.spec):
+        evidence = replace(evidence, exchanged=_exchanged(stages, evidence, context.quiet()))
         verdict = judge(evidence)
-    return replace(result, verdict=verdict, check=check, evidence=evidence)
+    return evidence, verdict
 
 
 def _asks_for_exchange(
     evidence: RegistrationEvidence, scene: SceneInfo, spec: Specification
 ) -> bool:
-    """Whether so few check points confirm a transform that the exchanged pair must, too.
+    """Whether so few check points confirm a transform that those of the exchanged pair must, too.
 
     What is rendered, or located by a sensor model, is no reference for another image.
     """
@@ -123,24 +152,27 @@ def _asks_for_exchange(
     return is_plain and not scene.input.is_in_sensor_geometry
 
 
-def _exchanged(
-    opened: OpenPair,
-    masked: Masked,
-    scene: SceneInfo,
-    spec: Specification,
-    evidence: RegistrationEvidence,
-    context: Context,
-) -> Exchanged:
-    """Return what the pair with exchanged roles shows of a transform."""
-    try:
-        stages = Stages.of(opened.images.exchanged(), masked.exchanged(), spec)
-        estimate, check = stages.checked(context)
-    except (NothingFoundError, TooFewPointsError, NoOverlapError):
-        return Exchanged()
-    points = stages.evidence(estimate, check, Surveys(), scene).held_out
-    px, input = evidence.grid.lattice(), evidence.estimate.transform.input_grid
-    there = input.pixel_to_map(evidence.estimate.transform(evidence.grid.pixel_to_map(px)))
-    reference = estimate.transform.input_grid
-    back = evidence.grid.map_to_pixel(reference.pixel_to_map(estimate.transform(there)))
-    apart_px = float(np.sqrt(np.mean(np.sum((back - px) ** 2, axis=1))))
-    return Exchanged(points.agreeing, points.total, points.log10_chance, apart_px)
+def _exchanged(stages: Stages, evidence: RegistrationEvidence, context: Context) -> Agreement:
+    """Return how check points of the pair with exchanged roles agree with a transform.
+
+    They lie in the other image, and are searched for from a coarse search of their own. If that
+    search leads to other tie points than those of the transform, there are none.
+    """
+    pair = stages.masked.pair
+    reference, input = pair.reference.source.grid, pair.input.source.grid
+    points = TiePoints.none()
+    with suppress(NothingFoundError, TooFewPointsError, NoOverlapError):
+        exchanged = stages.exchanged()
+        coarse = Transform(exchanged.coarse(context), input.crs, reference)
+        if _apart_px(evidence, coarse) <= FIT_RADIUS_PX:
+            points = exchanged.check(coarse.model, context).points
+    return replace(evidence, check=points.exchanged(reference, input)).held_out
+
+
+def _apart_px(evidence: RegistrationEvidence, way_back: Transform) -> float:
+    """Return how far, at most, a transform and one back lead from where they began."""
+    grid, transform = evidence.grid, evidence.estimate.transform
+    px = grid.lattice()
+    there = transform.input_grid.pixel_to_map(transform(grid.pixel_to_map(px)))
+    back = grid.map_to_pixel(way_back.input_grid.pixel_to_map(way_back(there)))
+    return float(np.hypot(*(back - px).T).max())

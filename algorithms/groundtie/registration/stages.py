@@ -50,6 +50,8 @@ class Stages:
 
     Parameters
     ----------
+    images
+        The pair without masks.
     masked
         What takes part.
     spec
@@ -62,6 +64,7 @@ class Stages:
         Fits the model.
     """
 
+    images: ImagePair
     masked: Masked
     spec: Specification
     held_out: HeldOut
@@ -70,7 +73,7 @@ class Stages:
 
     @classmethod
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
-        """Put the stages together; `images` have no masks."""
+        """Put the stages together; parameters as the class."""
         held_out = HeldOut.of(images)
         settings = SimilaritySettings(spec.similarity)
         chips = ChipMatcher(masked.pair, settings, held_out)
@@ -86,7 +89,11 @@ class Stages:
             else chips
         )
         fit = _fit(images, masked.pair, matcher, held_out, spec)
-        return cls(masked, spec, held_out, matcher, fit)
+        return cls(images, masked, spec, held_out, matcher, fit)
+
+    def exchanged(self) -> Stages:
+        """Return the stages of the pair with the roles of its images exchanged."""
+        return Stages.of(self.images.exchanged(), self.masked.exchanged(), self.spec)
 
     def checked(self, context: Context) -> tuple[Estimate, Check]:
         """Return the estimate and its check points.
@@ -101,7 +108,7 @@ class Stages:
         context.update(0.45, "matching tie points")
         estimate = self.fit.estimate(coarse, self.spec.model, context.part(0.45, 0.9))
         context.update(0.9, "checking with points that took no part")
-        return estimate, self.check(estimate, context.part(0.9, 1.0))
+        return estimate, self.check(estimate.transform.model, context.part(0.9, 1.0))
 
     def coarse(self, context: Context) -> Model:
         """Return the coarse model; that of images which are placed is none at all."""
@@ -110,9 +117,8 @@ class Stages:
         limits = self.masked.pair.limits
         return find_coarse_model(self.matcher, self.held_out, limits, context)
 
-    def check(self, estimate: Estimate, context: Context) -> Check:
-        """Match the check chips around what an estimate predicts."""
-        model = estimate.transform.model
+    def check(self, model: Model, context: Context) -> Check:
+        """Match the check chips around what a model on the map predicts."""
         return check_model(self.matcher, self.held_out.layout, model, context)
 
     def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:

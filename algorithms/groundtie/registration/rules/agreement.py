@@ -7,7 +7,6 @@ from ...geometry.judging import (
     LARGEST_LOG10_CHANCE,
     SMALLEST_INLIER_SHARE,
     SMALLEST_SHARE_UNROTATED,
-    TOLERANCE_PX,
 )
 from ..evidence import EvidenceOfPoints, RegistrationEvidence
 from .rule import Rule
@@ -34,14 +33,15 @@ def _exchanged_roles(evidence: EvidenceOfPoints) -> str | None:
     if not isinstance(evidence, RegistrationEvidence) or evidence.exchanged is None:
         return None
     points = evidence.exchanged
-    if points.log10_chance > LARGEST_LOG10_CHANCE:
-        return (
-            f"with reference and input exchanged, {points.agreeing} of {points.total} check points "
-            "agree, as they may by chance"
-        )
-    if points.apart_px <= min(TOLERANCE_PX, evidence.max_error_px):
+    if points.log10_chance <= LARGEST_LOG10_CHANCE:
         return None
-    return f"with reference and input exchanged, the transform lies {points.apart_px:.1f} px off"
+    exchanged = "with reference and input exchanged"
+    if points.total == 0:
+        return f"{exchanged}, the coarse search finds another place, or none"
+    return (
+        f"{exchanged}, {points.agreeing} of {points.total} check points agree, as they may by "
+        "chance"
+    )
 
 
 AGREEMENT_RULES: tuple[Rule, ...] = (
@@ -64,9 +64,9 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "exchanged roles",
         "check points would agree as well by chance with a probability above "
-        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and with reference "
-        "and input exchanged they agree as they may by chance, or the transform lies farther off "
-        f"than the largest error, or than {TOLERANCE_PX:g} px, within which points agree",
+        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and those with "
+        "reference and input exchanged, around a coarse search of their own, agree as they may by "
+        "chance",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,
