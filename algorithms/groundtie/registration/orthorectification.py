@@ -9,6 +9,7 @@ from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..sensor.dense import DenseOrientation
+from ..sensor.longitudes import turned
 from .sensor_input import OrientedImage
 
 
@@ -48,7 +49,9 @@ def write_orthoimage(
         pixels = source.grid.on_own_pixels()
         grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size)
     else:
-        covering_grid(grid, by.to_nominal_map(source.grid.outline()), within=True)
+        middle = grid.pixel_to_map([grid.centre_px])[0, 0]
+        outline = turned(by.to_nominal_map(source.grid.outline()), by.crs, middle)
+        covering_grid(grid, outline, within=True)
     dense, workers, progress = DenseOrientation(by), context.workers, context.progress
     warp_raster(source, dense, grid, path, resampling, workers=workers, progress=progress)
     return grid

@@ -14,6 +14,7 @@ from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, PointFu
 from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
+from .longitudes import turned
 from .smooth_map import smooth_map
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
@@ -209,12 +210,14 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     if grid.crs is None:
         raise GeoreferencingError(f"{source.path} has no CRS")
 
+    corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
+    middle, own_middle = (corner + opposite)[0] / 2, grid.pixel_to_map([grid.centre_px])[0, 0]
+
     def exact(places: FloatArray) -> FloatArray:
-        xy = reproject(places, LON_LAT, grid.crs)
+        xy = turned(reproject(places, LON_LAT, grid.crs), grid.crs, own_middle)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
     surface = surface_around(source, exact, lon_lat)
-    corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
-    return replace(surface, to_px=fast)
+    return replace(surface, to_px=lambda places: fast(turned(places, LON_LAT, middle)))

@@ -14,6 +14,7 @@ from ..geometry.terrain_model import LEAST_SLOPE
 from ..rasters.grid import LON_LAT, FloatArray, Grid, PointFunction, crs_name, reproject
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
+from .longitudes import turned
 from .rpc import RPC, ground_lattice
 from .smooth_map import smooth_map
 
@@ -80,7 +81,7 @@ class Orientation:
 
         NaN where the line of sight does not meet the ground.
         """
-        xy = reproject(self._ground(np.asarray(px, float)), LON_LAT, self.crs)
+        xy = _on_map(self._ground(np.asarray(px, float)), self.rpc, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_nominal_map(self, px: ArrayLike) -> FloatArray:
@@ -90,7 +91,7 @@ class Orientation:
         lost = ~np.isfinite(xy).all(axis=1)
         if lost.any():
             level = self.rpc.localise(px[lost], self.heights.typical_m)
-            xy[lost] = reproject(level, LON_LAT, self.crs)
+            xy[lost] = _on_map(level, self.rpc, self.crs)
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def _ground(self, px: FloatArray) -> FloatArray:
@@ -189,16 +190,26 @@ def orient(
     known = float(np.isfinite(heights.at(places)).mean())
     if dem is not None and known == 0:
         raise NoOverlapError(f"{dem.path} covers nothing of the area of {source.path}")
-    xy = reproject(np.vstack([extremes, seen]), LON_LAT, crs)
+    xy = _on_map(np.vstack([extremes, seen]), rpc, crs)
     if not np.isfinite(xy).all():
         raise NoOverlapError(f"{source.path} lies outside of the domain of {crs_name(crs)}")
     around = _AROUND * (xy.max(axis=0) - xy.min(axis=0))
 
     def exact(places: FloatArray) -> FloatArray:
-        return reproject(places, crs, LON_LAT)
+        return turned(reproject(places, crs, LON_LAT), LON_LAT, rpc.offset[0])
 
-    to_lon_lat = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
-    return Orientation(rpc, heights, crs, to_lon_lat, known)
+    fast = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
+    x = float(np.median(xy[:, 0]))
+    return Orientation(rpc, heights, crs, lambda places: fast(turned(places, crs, x)), known)
+
+
+def _on_map(lon_lat: FloatArray, rpc: RPC, crs: CRS) -> FloatArray:
+    """Return map positions, (n, 2), of longitudes and latitudes as RPCs have them.
+
+    Longitudes of the map, too, go on across the antimeridian.
+    """
+    x = reproject(np.array([rpc.offset[:2]]), LON_LAT, crs)[0, 0]
+    return turned(reproject(lon_lat, LON_LAT, crs), crs, x)
 
 
 def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:
@@ -221,7 +232,7 @@ def sensor_grid(source: RasterSource, orientation: Orientation) -> SensorGrid:
     width, height = source.grid.size
     corners = np.array([[0, 0], [width, 0], [0, height]], float) - 0.5
     ground = orientation.rpc.localise(corners, orientation.heights.typical_m)
-    origin, right, down = reproject(ground, LON_LAT, orientation.crs)
+    origin, right, down = _on_map(ground, orientation.rpc, orientation.crs)
     along, across = (right - origin) / width, (down - origin) / height
     transform = Affine(along[0], across[0], origin[0], along[1], across[1], origin[1])
     return SensorGrid(transform, orientation.crs, width, height, orientation)

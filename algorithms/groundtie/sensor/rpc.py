@@ -26,6 +26,8 @@ _STEPS = 12
 # Beyond this multiple of their scales ground positions are none of the image's.
 VALID_RANGE = 1.5
 
+_HALF_TURN_DEG = 180.0
+
 # Nodes a side, along the ground and along height, of the lattice that the inverse starts from.
 _START_NODES = (9, 9, 5)
 
@@ -188,7 +190,11 @@ class RPC:
         lph = np.empty((3, len(lon_lat)))
         for axis, values in enumerate((lon_lat[:, 0], lon_lat[:, 1], height)):
             np.subtract(values, self.offset[axis], out=lph[axis])
-            lph[axis] *= 1 / self.scale[axis]
+        # Across the antimeridian longitudes begin anew.
+        if (np.abs(lph[0]) > _HALF_TURN_DEG).any():
+            with np.errstate(invalid="ignore"):
+                lph[0] -= 2 * _HALF_TURN_DEG * np.rint(lph[0] / (2 * _HALF_TURN_DEG))
+        lph *= 1 / np.array(self.scale)[:, None]
         return lph
 
     def _newton(self, lph: FloatArray, target: FloatArray, terms: FloatArray) -> None:
