@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from raster_files import utm_grid, write_raster
 from scipy.sparse import lil_matrix
 from scipy.sparse.linalg import spsolve
 
-from groundtie.rasters.height_surfaces import fill_voids
+from groundtie.rasters.height_surfaces import fill_voids, surface_around
+from groundtie.rasters.reading import open_raster
 
 
 def ramp(height: int, width: int) -> np.ndarray:
@@ -50,3 +54,25 @@ def test_one_value_fills_all() -> None:
     np.testing.assert_allclose(filled, 7, rtol=1e-6)
     with pytest.raises(ValueError, match="nothing is valid"):
         fill_voids(np.zeros((4, 4), np.float32), np.zeros((4, 4), bool))
+
+
+@pytest.mark.parametrize("void", [-9999.0, -32768.0])
+@pytest.mark.parametrize("nodata", [None, "declared"])
+def test_voids_of_large_regions_take_no_part_in_means(
+    tmp_path: Path, void: float, nodata: str | None
+) -> None:
+    """Whether they are declared or not: a slope goes on through a disk of them."""
+    size = 1300
+    rows, cols = np.mgrid[:size, :size]
+    slope = (300 + 0.2 * cols - 0.1 * rows).astype(np.float32)
+    is_void = np.hypot(cols - 600, rows - 640) < 70.0
+    heights = np.where(is_void, np.float32(void), slope)
+    declared = {} if nodata is None else {"nodata": void}
+    write_raster(tmp_path / "dem.tif", heights, utm_grid(size, size), **declared)
+    with open_raster(tmp_path / "dem.tif") as dem:
+        corners = np.array([[0.0, 0.0], [size - 1, size - 1]])
+        surface = surface_around(dem, lambda px: px, corners)
+        places = np.column_stack([cols[is_void], rows[is_void]]).astype(float)
+        error = surface.at(places) - slope[is_void]
+    assert surface.filled.shape == (512, 512)
+    assert np.abs(error).max() < 1.0

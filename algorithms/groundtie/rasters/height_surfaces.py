@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoOverlapError, RasterContentError
+from .averaging import average_window
 from .grid import POSITION_ERROR_PX, FloatArray, PointFunction, finite
 from .height_units import in_metres
 from .kernels import interpolate
@@ -139,10 +140,22 @@ def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
 def read_heights(
     source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
 ) -> tuple[FloatImage, Mask]:
-    """Return heights in metres and which of them are valid, as `RasterSource.read`."""
-    stored, valid = source.read(window, 1, out_shape)
+    """Return heights in metres and which of them are valid, as `RasterSource.read`.
+
+    Voids that nobody declared take no part in means either, so that no overviews are read.
+    """
+    if out_shape is not None:
+        means, known = average_window(_read_band, source, source, window, out_shape)
+        return means[0], known[0]
+    stored, valid = source.read(window, 1)
     values = in_metres(stored, source)
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
+
+
+def _read_band(source: RasterSource, window: Window) -> tuple[FloatImage, Mask]:
+    """Return heights and which of them are valid, shapes (1, h, w)."""
+    values, valid = read_heights(source, window)
+    return values[None], valid[None]
 
 
 def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArray) -> RasterSurface:
