@@ -55,6 +55,16 @@ def test_an_output_is_not_an_input_even_by_another_name(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.parametrize("name", ["b_RPC.TXT", "b.rpb"])
+def test_an_output_is_no_raster_whose_rpcs_are_an_input(tmp_path: Path, name: str) -> None:
+    """They would be removed as those of an older raster."""
+    (tmp_path / name).touch()
+    rpcs = ("rpc", FileIn(**TEXTS, suffixes=(".txt", ".rpb")), tmp_path / name)
+    check_paths([rpcs, ("output", RASTER_OUT, tmp_path / "c.tif")])
+    with pytest.raises(SameFileError, match=f"take .*{name}, which is rpc, for RPCs of output"):
+        check_paths([rpcs, ("output", RASTER_OUT, tmp_path / "b.tif")])
+
+
 def test_two_outputs_are_two_files(tmp_path: Path) -> None:
     with pytest.raises(SameFileError, match="second is the same file as first"):
         check_paths(

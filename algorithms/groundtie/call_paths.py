@@ -19,7 +19,7 @@ from .kinds import (
     WrittenKind,
     shown_name,
 )
-from .raster_names import identity
+from .raster_names import identity, rpc_files
 from .strict_json import read_json
 
 
@@ -64,6 +64,13 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
         if other != name:
             raise SameFileError(f"{name} is the same file as {other}: {path}")
         _check_place(name, path, made)
+        for rpcs in rpc_files(path):
+            if rpcs.resolve() in taken:
+                owner = taken[rpcs.resolve()]
+                raise SameFileError(
+                    f"GDAL would take {rpcs}, which is {owner}, for RPCs of {name}: give {name} "
+                    "another name"
+                )
     for name, kind, path in outputs:
         for more in kind.also_written(path):
             own = f"a file of {name}"

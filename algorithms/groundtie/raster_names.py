@@ -37,6 +37,12 @@ _REMOTE = re.compile(
     r"/vsi(curl|s3|gs|az|adls|oss|swift|webhdfs|hdfs)(_streaming)?[/?]|\b(https?|ftp)://", re.I
 )
 
+# What holds RPCs beside a raster, in place of its suffix and in any case; GDAL takes the first.
+_RPC_ENDINGS = (".rpb", "_rpc.txt")
+
+# Rasters that may have them.
+_WITH_RPCS = (".tif", ".tiff", ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", ".til", ".vrt")
+
 
 def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Path | str:
     """Return what a name means: a `Path` of a file, or GDAL's own name as text.
@@ -81,6 +87,32 @@ def file_name(name: Any) -> str:
     if is_remote(text):
         return PurePosixPath(urlsplit(text).path).name
     return Path(text).name
+
+
+def rpc_files(path: Path) -> list[Path]:
+    """Return the files beside a raster that GDAL prefers to RPCs in its tags, the first to all.
+
+    Of a path that is no raster's there are none.
+    """
+    if path.suffix.lower() not in _WITH_RPCS:
+        return []
+    wanted = [path.stem.lower() + ending for ending in _RPC_ENDINGS]
+    found = [name for name in _names_beside(path) if name.lower() in wanted]
+    return [path.with_name(n) for n in sorted(found, key=lambda n: (wanted.index(n.lower()), n))]
+
+
+def is_only_raster_of_its_name(path: Path) -> bool:
+    """Return whether no other raster lies there that has the same RPC files."""
+    others = (Path(name) for name in _names_beside(path) if name != path.name)
+    same = (other for other in others if other.stem.lower() == path.stem.lower())
+    return all(other.suffix.lower() not in _WITH_RPCS for other in same)
+
+
+def _names_beside(path: Path) -> list[str]:
+    try:
+        return os.listdir(path.parent)
+    except OSError:
+        return []
 
 
 def identity(name: Path | str) -> Hashable:

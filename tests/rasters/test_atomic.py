@@ -6,7 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rasterio
+from raster_files import write_raster
+from rpc_models import camera_rpc, to_rasterio
 
 from groundtie.errors import CancelledError, OutputError, RasterOpenError
 from groundtie.rasters import atomic
@@ -79,6 +83,38 @@ def test_sidecars_of_the_old_file_disappear(tmp_path: Path) -> None:
     assert final.read_text() == "new"
 
 
+@pytest.mark.parametrize("name", ["image_RPC.TXT", "image_rpc.txt", "image.RPB", "image.rpb"])
+def test_rpcs_of_an_older_raster_disappear(tmp_path: Path, name: str) -> None:
+    """GDAL prefers them to those in the new one's tags."""
+    (tmp_path / name).write_text("LINE_OFF: 7")
+    rpcs = to_rasterio(camera_rpc())
+    with Outputs() as outputs:
+        write_raster(outputs.stage(tmp_path / "image.tif"), np.ones((4, 4), np.uint8), rpcs=rpcs)
+    with rasterio.open(tmp_path / "image.tif") as dataset:
+        assert dataset.rpcs.line_off == rpcs.line_off
+    assert os.listdir(tmp_path) == ["image.tif"]
+
+
+@pytest.mark.parametrize("other", ["image.NTF", "image.jp2", "IMAGE.TIL"])
+def test_rpcs_of_another_raster_stay(tmp_path: Path, other: str) -> None:
+    for name in (other, "image.RPB"):
+        (tmp_path / name).write_text("a vendor's")
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / "image.tif").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted([other, "image.RPB", "image.tif"])
+
+
+def test_rpcs_are_removed_for_rasters_alone(tmp_path: Path) -> None:
+    for name in ("image_RPC.TXT", "other.RPB"):
+        (tmp_path / name).write_text("old")
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / "image.csv").write_text("a table")
+        outputs.stage(tmp_path / "other.tif").write_text("a raster")
+        outputs.stage(tmp_path / "other.RPB").write_text("its RPCs")
+    assert sorted(os.listdir(tmp_path)) == ["image.csv", "image_RPC.TXT", "other.RPB", "other.tif"]
+    assert (tmp_path / "other.RPB").read_text() == "its RPCs"
+
+
 def test_neighbours_with_alike_names_are_left_alone(tmp_path: Path) -> None:
     for name in ("image.tif.txt", "image.tiff", "image.png"):
         (tmp_path / name).write_text(name)
@@ -115,7 +151,9 @@ def test_all_is_as_before_if_a_file_cannot_be_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, new: bool
 ) -> None:
     finals = [tmp_path / name for name in ("a.tif", "b.csv")]
-    before = {} if new else {"a.tif": "old", "a.tif.msk": "old mask", "b.csv": "old"}
+    before = (
+        {} if new else {"a.tif": "old", "a.tif.msk": "old mask", "a.RPB": "old", "b.csv": "old"}
+    )
     for name, text in before.items():
         (tmp_path / name).write_text(text)
 

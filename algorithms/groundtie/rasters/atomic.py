@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import GroundTieError, OutputError, raised_by
+from ..raster_names import is_only_raster_of_its_name, rpc_files
 from ..runs import has_written, run_tags, will_make
 from .hidden_files import Claim, final_name, hidden_name, new_token, remove
 
@@ -37,8 +38,8 @@ class Outputs:
     Inside the `with` block they are written under hidden names in the folders of their final
     names. Leaving the block renames them, in the order in which they were staged; leaving it by an
     exception removes them. Sidecar files (`.aux.xml`) go along, just before their files; those of a
-    file that is replaced (`.msk`, `-wal`, …) disappear. What runs that died left in these folders
-    is removed.
+    file that is replaced (`.msk`, `-wal`, RPCs, …) disappear. What runs that died left in these
+    folders is removed.
     """
 
     def __init__(self) -> None:
@@ -111,7 +112,7 @@ class Outputs:
             for final, staged in self._staged.items():
                 self._keep(final)
                 # Before it is replaced: statistics or a mask of another file would be wrong.
-                for sidecar in _sidecars(final):
+                for sidecar in self._stale(final):
                     sidecar.unlink()
                 for path in (*_sidecars(staged), staged):
                     place = _beside(final, path.name[len(staged.name) :])
@@ -131,12 +132,18 @@ class Outputs:
 
     def _keep(self, final: Path) -> None:
         """Give a file and what is beside it a second name, by which to undo that it is replaced."""
-        for old in (final, *_sidecars(final)):
+        for old in (final, *self._stale(final)):
             aside = self._hidden(old, "old")
             # Some disks know no second names: what is replaced there cannot be undone.
             with contextlib.suppress(OSError):
                 os.link(old, aside)
                 self._aside[old] = aside
+
+    def _stale(self, final: Path) -> list[Path]:
+        """Return what lies beside a file and would be wrong for another one of its name."""
+        # GDAL takes what RPCs lie beside a raster for the raster's own.
+        rpcs = rpc_files(final) if is_only_raster_of_its_name(final) else []
+        return [*_sidecars(final), *(path for path in rpcs if path not in self._staged)]
 
     def _undo(self, made: list[Path]) -> None:
         for path in made:
