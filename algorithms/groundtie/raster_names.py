@@ -89,15 +89,18 @@ def file_name(name: Any) -> str:
     return Path(text).name
 
 
-def rpc_files(path: Path) -> list[Path]:
+def rpc_files(path: Path, more: Path | None = None) -> list[Path]:
     """Return the files beside a raster that GDAL prefers to RPCs in its tags, the first to all.
 
-    Of a path that is no raster's there are none.
+    Of a path that is no raster's there are none. `more` is a file that is yet to be written.
     """
     if path.suffix.lower() not in _WITH_RPCS:
         return []
     wanted = [path.stem.lower() + ending for ending in _RPC_ENDINGS]
-    found = [name for name in _names_beside(path) if name.lower() in wanted]
+    names = set(_names_beside(path))
+    if more is not None and more.parent.resolve() == path.parent.resolve():
+        names.add(more.name)
+    found = [name for name in names if name.lower() in wanted]
     return [path.with_name(n) for n in sorted(found, key=lambda n: (wanted.index(n.lower()), n))]
 
 

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rasterio
 from raster_files import write_raster
-from rpc_models import camera_rpc
+from rpc_models import camera_rpc, to_rasterio
 
+from groundtie.errors import OutputError, SameFileError
 from groundtie.progress import SILENT
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.refinement_output import RefinementFiles, _write_rpcs
+from groundtie.registration.refinement_output import RefinementFiles, _write_rpcs, require_place
 from groundtie.registration.sensor_input import open_sensor_image
-from groundtie.sensor.rpc_files import read_rpc
+from groundtie.sensor.rpc_files import read_rpc, write_rpc
 
 SIZE = (60, 50)
 
@@ -43,3 +45,55 @@ def test_only_what_is_asked_for_is_named(tmp_path: Path) -> None:
         "output": str(tmp_path / "r.txt"),
         "report": str(tmp_path / "r.html"),
     }
+
+
+def image_beside(folder: Path, *names: str) -> Path:
+    """Write an image of RPCs in tags, or in files of some names, beside files of other ones."""
+    tags = {} if names else {"rpcs": to_rasterio(camera_rpc(SIZE))}
+    path = write_raster(folder / "image.tif", np.ones(SIZE[::-1], np.uint8), **tags)
+    for i, name in enumerate(names):
+        write_rpc(folder / f"{i}{Path(name).suffix}", camera_rpc(SIZE).shifted((i, 0)))
+        (folder / f"{i}{Path(name).suffix}").rename(folder / name)
+    return path
+
+
+@pytest.mark.parametrize("name", ["image.RPB", "image.rpb", "image_RPC.TXT", "image_rpc.txt"])
+def test_a_file_that_is_read_for_the_image_is_no_output(tmp_path: Path, name: str) -> None:
+    path, spare = image_beside(tmp_path, name), tmp_path / "spare.rpb"
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        require_place(source, spare, None)
+        for outputs in ((tmp_path / name,), (spare, None, tmp_path / name)):
+            with pytest.raises(SameFileError, match=f"{name} is read for"):
+                require_place(source, *outputs)
+
+
+@pytest.mark.parametrize(
+    ("there", "output", "is_taken"),
+    [
+        ((), "image_RPC.TXT", True),
+        ((), "image.RPB", True),
+        (("image.RPB",), "image_RPC.TXT", False),
+        (("image.rpb",), "image_rpc.txt", False),
+        (("image_RPC.TXT",), "image_rpc.txt", False),
+        (("image_RPC.TXT",), "image.RPB", True),
+        (("image.RPB",), "other_RPC.TXT", True),
+        (("image.RPB",), "image.tiff", False),
+        ((), "image.tiff", True),
+    ],
+)
+def test_refined_rpcs_are_written_where_gdal_takes_them(
+    tmp_path: Path, there: tuple[str, ...], output: str, is_taken: bool
+) -> None:
+    path = image_beside(tmp_path, *there)
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        if is_taken:
+            require_place(source, tmp_path / output)
+        else:
+            with pytest.raises(OutputError, match=rf"from {there[0]}, .*: move {there[0]} else"):
+                require_place(source, tmp_path / output)
+    if output.startswith("image") and not output.endswith("tiff"):
+        refined = camera_rpc(SIZE).shifted((0, 1000.0))
+        write_rpc(tmp_path / output, refined)
+        with rasterio.open(path) as dataset:
+            line = float(dataset.tags(ns="RPC")["LINE_OFF"].split()[0])
+        assert (line == pytest.approx(refined.image_offset[1])) == is_taken

@@ -14,12 +14,18 @@ from rpc_scenes import SIZE, Scene, ground_texture, make_scene
 
 import groundtie
 from benchmarks.rpc_city import true_error_px
-from groundtie.errors import GroundTieError, NotRegisteredError, OutputError, ParameterError
+from groundtie.errors import (
+    GroundTieError,
+    NotRegisteredError,
+    OutputError,
+    ParameterError,
+    SameFileError,
+)
 from groundtie.geometry.accuracy import Common
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
-from groundtie.sensor.rpc_files import read_rpc
+from groundtie.sensor.rpc_files import read_rpc, write_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags
 
 DRIFT = Bias("shift_drift", SIZE, np.array([[-27.0, 33.0], [2.5, -3.0]]), np.zeros((4, 4)))
@@ -238,6 +244,18 @@ def test_refined_images_orthorectify_to_where_they_belong(tmp_path: Path) -> Non
     )  # fmt: skip
     with rasterio.open(tmp_path / "ortho.tif") as a, rasterio.open(tmp_path / "expected.tif") as b:
         assert np.nanmax(np.abs(a.read() - b.read())) < 0.35
+
+
+def test_the_vendors_rpcs_are_not_written_over(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    with rasterio.open(files["image"]) as image:
+        write_rpc(tmp_path / "image.RPB", rpc_from_tags(image.tags(ns="RPC"), "image"))
+    before = (tmp_path / "image.RPB").read_bytes()
+    for name, error in (("image.RPB", SameFileError), ("image_RPC.TXT", OutputError)):
+        with pytest.raises(error, match=r"image\.RPB"):
+            groundtie.refine_rpc(output=tmp_path / name, dem_datum="ellipsoidal", **files)
+    assert (tmp_path / "image.RPB").read_bytes() == before
+    assert not (tmp_path / "image_RPC.TXT").exists()
 
 
 def test_right_rpcs_are_left_alone(tmp_path: Path) -> None:

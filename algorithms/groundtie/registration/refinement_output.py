@@ -10,11 +10,14 @@ from typing import Any
 
 from ..assessment.comparison import Comparison
 from ..declaration import given_files
+from ..errors import OutputError, SameFileError
 from ..kinds import GEOTIFF
 from ..progress import Progress
+from ..raster_names import is_only_raster_of_its_name, rpc_files
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import write_with_geotransform
 from ..rasters.grid import FloatArray
+from ..rasters.reading import RasterSource
 from ..report.refinement_report import RefinementReport
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck
@@ -113,6 +116,41 @@ class RefinementFiles:
             title=f"RPCs of {Path(refinement.image.source.path).name}, refined",
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
+        )
+
+
+def require_place(source: RasterSource, output: Path, *more: Path | None) -> None:
+    """Refuse outputs that are files of the image, and RPCs that GDAL would not take from there.
+
+    Parameters
+    ----------
+    source
+        The image.
+    output
+        Where its RPCs, or a copy with them, are to be written.
+    more
+        Further outputs; None: not asked for.
+
+    Raises
+    ------
+    SameFileError
+        An output is a file that GDAL reads for the image.
+    OutputError
+        GDAL would take other RPCs.
+    """
+    read = {Path(name).resolve() for name in source.files()}
+    for path in (output, *more):
+        if path is not None and path.resolve() in read:
+            raise SameFileError(f"{path} is read for {source.path}: give the output another name")
+    is_copy = output.suffix.lower() in GEOTIFF
+    raster = output if is_copy else Path(source.path)
+    found = rpc_files(raster, None if is_copy else output)
+    # Those that lie beside a new raster of that name alone are removed.
+    hidden = not is_only_raster_of_its_name(output) if is_copy else output in found[1:]
+    if found and hidden:
+        raise OutputError(
+            f"GDAL takes the RPCs of {raster} from {found[0].name}, and would not take those of "
+            f"{output}: move {found[0].name} elsewhere, or give the output another name"
         )
 
 

@@ -23,7 +23,7 @@ from ..sensor.rpc_fit import RPCFit
 from .asked import asked_masks, searched
 from .ground_control import GroundControl, match_ground_control, require_crs
 from .refinement import Refinement, RefinementEvidence
-from .refinement_output import RefinementFiles
+from .refinement_output import RefinementFiles, require_place
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
 from .verdict import Verdict, both_units
@@ -231,6 +231,7 @@ def _matched(
         reference = stack.enter_context(open_raster(given["reference"]))
     crs = None if reference is None else require_crs(reference)
     sensor = open_oriented_image(given["image"], given["rpc"], ground, crs, stack, context.progress)
+    require_place(sensor.source, given["output"], given.get("residuals"), given.get("report"))
     if reference is None:
         return sensor, None
     spec = searched(Specification(), given, "image")
