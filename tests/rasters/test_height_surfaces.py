@@ -76,3 +76,26 @@ def test_voids_of_large_regions_take_no_part_in_means(
         error = surface.at(places) - slope[is_void]
     assert surface.filled.shape == (512, 512)
     assert np.abs(error).max() < 1.0
+
+
+@pytest.mark.parametrize("size", [300, 1300])
+def test_voids_that_are_open_to_the_edge_stay(tmp_path: Path, size: int) -> None:
+    """What lies behind them is not known; those that valid pixels enclose are filled."""
+    heights = ramp(size, size) / 10
+    rows, cols = np.mgrid[:size, :size]
+    is_open = cols > size // 2
+    is_enclosed = np.hypot(cols - size / 4, rows - size / 2) < size / 10
+    heights[is_open | is_enclosed] = -9999
+    write_raster(tmp_path / "dem.tif", heights, utm_grid(size, size), nodata=-9999.0)
+    corners = np.array([[0.0, 0.0], [size - 1, size - 1]])
+    places = np.column_stack([cols.ravel(), rows.ravel()]).astype(float)
+    with open_raster(tmp_path / "dem.tif") as dem:
+        surface = surface_around(dem, lambda px: px, corners, fill_open=False)
+        found = surface.at(places).reshape(size, size)
+        measured = surface.is_measured(places).reshape(size, size)
+        whole = surface_around(dem, lambda px: px, corners).at(places)
+    near_rim = np.abs(cols - size // 2) < 4
+    assert np.isnan(found[is_open & ~near_rim]).all()
+    assert np.abs(found - ramp(size, size) / 10)[~is_open & ~near_rim].max() < 1.0
+    assert np.isfinite(whole).all()
+    assert measured.mean() == pytest.approx(1 - (is_open | is_enclosed).mean(), abs=0.01)

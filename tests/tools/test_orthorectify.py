@@ -242,3 +242,30 @@ def test_a_full_disk_leaves_nothing_behind(files: dict[str, Path], name: str) ->
     assert sorted(path.name for path in files["output"].parent.iterdir()) == [
         "dem.tif", "image.tif",
     ]  # fmt: skip
+
+
+def test_no_heights_are_invented_beyond_the_rim_of_a_terrain_model(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    """As of a model whose raster goes on without data; voids inside are filled, and stated."""
+    west, hole = np.zeros((60, 60), bool), np.zeros((60, 60), bool)
+    west[:, :30], hole[28:34, 36:40] = True, True
+    half = {**files, "dem": write_dem(tmp_path / "half.tif", holes=west)}
+    found = groundtie.orthorectify(**half, dem_datum="ellipsoidal")
+    with rasterio.open(files["output"]) as ortho:
+        valid = np.isfinite(ortho.read(1)).sum()
+    nodes = np.stack(np.meshgrid(np.arange(0, 600, 10), np.arange(0, 500, 10)), -1).reshape(-1, 2)
+    expected = np.mean(RPC.localise(nodes, 300.0)[:, 0] > 9.0)
+    assert valid * found.grid.pixel_size_m**2 / (600 * 500) == pytest.approx(expected, abs=0.07)
+    share = int(re.search(r"which covers (\d+) % of the image", found.heights)[1])
+    assert share / 100 == pytest.approx(expected, abs=0.07)
+    with pytest.raises(NoOverlapError, match=f"covers only {share} %"):
+        groundtie.orthorectify(**half, dem_datum="ellipsoidal", dem_cover=90)
+    whole = {**files, "output": tmp_path / "whole.tif"}
+    groundtie.orthorectify(**whole, dem_datum="ellipsoidal")
+    holed = {**files, "dem": write_dem(tmp_path / "holed.tif", holes=hole)}
+    found = groundtie.orthorectify(**holed, dem_datum="ellipsoidal", reference=whole["output"])
+    with rasterio.open(whole["output"]) as expected, rasterio.open(files["output"]) as ortho:
+        assert np.mean(np.isfinite(ortho.read(1)) != np.isfinite(expected.read(1))) < 0.01
+    # 150 m × 71 m of 600 m × 500 m.
+    assert re.search(r"which covers 9[67] % of the image; [34] % are voids that", found.heights)

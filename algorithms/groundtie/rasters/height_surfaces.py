@@ -49,6 +49,10 @@ class RasterSurface:
         The pixels that are asked for.
     filled
         The region, reduced, without voids, for those of the raster.
+    valid
+        Which of these pixels hold values of the raster.
+    known
+        Which are in no void that stays one.
     margin_px
         How far beyond the outer pixels' centres their values hold.
     """
@@ -57,16 +61,25 @@ class RasterSurface:
     to_px: PointFunction
     region: Window
     filled: FloatImage
+    valid: Mask
+    known: Mask
     margin_px: float = _HALF_PX
 
     def at(self, positions: FloatArray) -> FloatArray:
-        """Return the values, shape (n,), at positions, (n, 2); NaN beyond the raster."""
+        """Return the values, shape (n,), at positions, (n, 2); NaN where there are none."""
         px = self.to_px(positions)
         values = np.full(len(px), np.nan)
         for part in _parts(px):
             piece = self.piece(px[part])
             values[part] = piece.at((px[part] - piece.corner).T)
         return values
+
+    def is_measured(self, positions: FloatArray) -> Mask:
+        """Return which positions, (n, 2), lie on values of the raster, to reduced pixels."""
+        measured = np.isfinite(self.at(positions))
+        col, row = np.rint(self.to_px(positions[measured])).T
+        measured[measured] = self.valid[self._nearest(*self._reduced(col, row))]
+        return measured
 
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface that some of its pixel positions, (n, 2), need."""
@@ -81,11 +94,21 @@ class RasterSurface:
         return SurfacePiece(image, low.astype(float), self.margin_px)
 
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
+        x, y = self._reduced(cols, rows)
+        values = interpolate(self.filled, np.stack([x, y])[:, None], "bilinear")[0]
+        values[~self.known[self._nearest(x, y)]] = np.nan
+        return values
+
+    def _reduced(self, cols: NDArray[Any], rows: NDArray[Any]) -> tuple[FloatArray, FloatArray]:
+        """Return where pixels of the raster lie among the reduced ones: columns and rows."""
         height, width = self.filled.shape
         x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
         y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
-        inside = np.stack([np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)])
-        return interpolate(self.filled, inside[:, None], "bilinear")[0]
+        return np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+
+    @staticmethod
+    def _nearest(x: FloatArray, y: FloatArray) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        return np.rint(y).astype(int), np.rint(x).astype(int)
 
 
 @dataclass(frozen=True)
@@ -95,7 +118,7 @@ class SurfacePiece:
     Parameters
     ----------
     image
-        Its values, without voids.
+        Its values; NaN in voids that stay.
     corner
         Column and row of the raster where it begins, shape (2,).
     margin_px
@@ -158,7 +181,9 @@ def _read_band(source: RasterSource, window: Window) -> tuple[FloatImage, Mask]:
     return values[None], valid[None]
 
 
-def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArray) -> RasterSurface:
+def surface_around(
+    source: RasterSource, to_px: PointFunction, region: FloatArray, fill_open: bool = True
+) -> RasterSurface:
     """Return the surface of a raster over a region.
 
     Parameters
@@ -169,6 +194,8 @@ def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArra
         From positions to its pixels, shapes (n, 2); NaN where they have none.
     region
         Positions of the region, (n, 2): those in between are asked for, too.
+    fill_open
+        Fill voids that are open to the region's edge, too: what lies beyond goes on as their rims.
 
     Raises
     ------
@@ -193,7 +220,15 @@ def surface_around(source: RasterSource, to_px: PointFunction, region: FloatArra
     values, valid = read_heights(source, window, None if reduce == 1 else shape)
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
-    return RasterSurface(source, to_px, window, fill_voids(values, valid))
+    known = np.ones_like(valid) if fill_open else valid | _are_enclosed(valid)
+    return RasterSurface(source, to_px, window, fill_voids(values, valid), valid, known)
+
+
+def _are_enclosed(valid: Mask) -> Mask:
+    """Return which pixels, (h, w), lie in voids that do not reach the edge."""
+    _, labels = cv2.connectedComponents((~valid).astype(np.uint8), connectivity=4)
+    at_edge = np.unique(np.concatenate([*labels[[0, -1]], *labels[:, [0, -1]].T]))
+    return ~np.isin(labels, [0, *at_edge])
 
 
 def fill_voids(values: FloatImage, valid: Mask) -> FloatImage:

@@ -57,9 +57,10 @@ class Ground:
     def _note(self, orientation: Orientation) -> str:
         """Return in words which heights are used, and of which share of the image they are."""
         if self.dem is not None:
-            share = orientation.known_share
+            share, filled = orientation.known_share, orientation.filled_share
             partly = "" if share == 1 else f", which covers {_percent(share)} of the image"
-            return f"heights of {self.dem} above {self.datum or self.geoid}{partly}"
+            voids = f"; {_percent(filled)} are voids that are filled" if filled else ""
+            return f"heights of {self.dem} above {self.datum or self.geoid}{partly}{voids}"
         height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, PointFunction, reproject
@@ -38,6 +39,10 @@ class ConstantHeight:
     def typical_m(self) -> float:
         """A height of the region."""
         return self.height_m
+
+    def is_measured(self, lon_lat: FloatArray) -> NDArray[np.bool_]:
+        """Return that the height is known everywhere, shape (n,)."""
+        return np.ones(len(lon_lat), bool)
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return heights in metres, shape (n,)."""
@@ -85,6 +90,10 @@ class TerrainHeights:
         """A height of the region: its median, and the geoid's."""
         geoid = 0.0 if self.geoid is None else float(np.median(self.geoid.filled))
         return float(np.median(self.terrain.filled)) + geoid
+
+    def is_measured(self, lon_lat: FloatArray) -> NDArray[np.bool_]:
+        """Return where, shape (n,), heights are the terrain model's own, not filled into voids."""
+        return self.terrain.is_measured(lon_lat) & np.isfinite(self.at(lon_lat))
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
         """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
@@ -146,7 +155,9 @@ class _TerrainOnGrid:
         image = self._piece.image
         geoid = np.zeros(1) if self.geoid is None else self.geoid.values
         low, high = float(np.nanmin(geoid)), float(np.nanmax(geoid))
-        return float(image.min()) + low, float(image.max()) + high
+        # Of a piece without heights no pixel is looked up.
+        lowest, highest = np.nan_to_num([np.fmin.reduce(image, None), np.fmax.reduce(image, None)])
+        return float(lowest) + low, float(highest) + high
 
     def lines(self, rows: slice) -> FloatImage:
         """Return heights in metres at the pixels of some rows; NaN if unknown."""
@@ -168,7 +179,8 @@ def terrain_heights(
     Parameters
     ----------
     dem
-        The terrain model, of any CRS; voids are filled from their rims.
+        The terrain model, of any CRS; voids are filled from their rims, but not those that are open
+        to the region's edge.
     geoid
         Heights of the geoid that the model's heights count from; None: they count from the
         ellipsoid.
@@ -217,7 +229,7 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
         xy = turned(reproject(places, LON_LAT, grid.crs), grid.crs, own_middle)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
-    surface = surface_around(source, exact, lon_lat)
+    surface = surface_around(source, exact, lon_lat, fill_open=False)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
     return replace(surface, to_px=lambda places: fast(turned(places, LON_LAT, middle)))

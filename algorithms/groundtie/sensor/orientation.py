@@ -52,7 +52,9 @@ class Orientation:
     to_lon_lat
         From map positions to longitude and latitude, shapes (n, 2).
     known_share
-        Share of the image whose heights are known.
+        Share of the image whose heights are known, by the terrain model's own values.
+    filled_share
+        Share of the image whose heights are filled into voids from their rims.
     """
 
     rpc: RPC
@@ -60,6 +62,7 @@ class Orientation:
     crs: CRS
     to_lon_lat: PointFunction
     known_share: float = 1.0
+    filled_share: float = 0.0
 
     def to_px(self, xy: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of map positions.
@@ -188,6 +191,7 @@ def orient(
     seen = seen_at(rpc, size, heights.typical_m)
     places = seen_at(rpc, size, heights.typical_m, _SHARE_NODES)
     known = float(np.isfinite(heights.at(places)).mean())
+    measured = float(heights.is_measured(places).mean())
     if dem is not None and known == 0:
         raise NoOverlapError(f"{dem.path} covers nothing of the area of {source.path}")
     xy = _on_map(np.vstack([extremes, seen]), rpc, crs)
@@ -200,7 +204,9 @@ def orient(
 
     fast = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
     x = float(np.median(xy[:, 0]))
-    return Orientation(rpc, heights, crs, lambda places: fast(turned(places, crs, x)), known)
+    return Orientation(
+        rpc, heights, crs, lambda places: fast(turned(places, crs, x)), measured, known - measured
+    )
 
 
 def _on_map(lon_lat: FloatArray, rpc: RPC, crs: CRS) -> FloatArray:
