@@ -234,6 +234,31 @@ def test_a_reference_elsewhere_writes_nothing(files: dict[str, Path], tmp_path: 
     assert not files["output"].exists()
 
 
+@pytest.mark.parametrize("height", [-250.0, 1050.0, 5000.0])
+def test_a_height_at_which_the_rpcs_do_not_hold_is_refused(
+    files: dict[str, Path], height: float
+) -> None:
+    """They are made for 0 to 800 m, and hold for half of that beyond."""
+    with pytest.raises(ParameterError, match=r"at a height of .* only from -200 to 1000 m"):
+        groundtie.orthorectify(files["image"], files["output"], height=height)
+    assert not files["output"].exists()
+
+
+def test_an_orthoimage_without_data_is_not_written(files: dict[str, Path], tmp_path: Path) -> None:
+    """The grid shows the image, but none of the ground whose height is known."""
+    files["dem"] = write_dem(tmp_path / "part.tif", size=16)
+    groundtie.orthorectify(files["image"], files["output"], height=300.0)
+    with rasterio.open(files["output"]) as ortho:
+        left, top, crs = ortho.bounds.left + 80, ortho.bounds.top - 80, ortho.crs
+    files["output"].unlink()
+    grid = Grid(Affine(1, 0, left, 0, -1, top), crs, 20, 20)
+    corner = write_raster(tmp_path / "corner.tif", np.ones((20, 20), np.uint8), grid)
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(NoOverlapError, match="would hold no data"):
+        groundtie.orthorectify(**files, dem_datum="ellipsoidal", reference=corner)
+    assert sorted(tmp_path.iterdir()) == before
+
+
 @pytest.mark.parametrize("name", ["ortho.tif", "ortho.cog.tif"])
 def test_a_full_disk_leaves_nothing_behind(files: dict[str, Path], name: str) -> None:
     files["output"] = files["output"].with_name(name)

@@ -82,10 +82,10 @@ class _Warp:
 
     def tiles(
         self, pool: ThreadPoolExecutor, ahead: int, progress: Progress
-    ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask]]:
-        """Yield all tiles in groups of bands: place, bands, values, and validity.
+    ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask, bool]]:
+        """Yield all tiles in groups of bands: place, bands, values, validity, whether any is valid.
 
-        The validity is that of the first band, (h, w).
+        The validity is that of the first band, (h, w); the last word is that of the group.
         """
         count = tile_count(self.target) * len(self.groups)
         only_masked = self.is_bare and self.leaves_gaps
@@ -97,7 +97,7 @@ class _Warp:
                 first = valid[0]
             if only_masked and (valid != first).any():
                 raise different_masks(self.source)
-            yield place, bands, values, first
+            yield place, bands, values, first, bool(valid.any())
             progress.update((i + 1) / count)
 
     def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
@@ -138,8 +138,10 @@ def warp_raster(
     *,
     workers: int = 2,
     progress: Progress = SILENT,
-) -> None:
+) -> bool:
     """Resample a raster onto a grid, once, from its original pixels, into a GeoTIFF.
+
+    Returns whether any of its pixels is valid.
 
     Memory is bounded: tiles are read, resampled and written one by one. Bands, dtype, colours,
     names and metadata are kept (see `writing.create_like`). Where there are no pixels, the result
@@ -193,9 +195,12 @@ def warp_raster(
         ) as file,
         ThreadPoolExecutor(workers) as pool,
     ):
-        for tile, group, values, known in warp.tiles(pool, workers + 1, pixels):
+        is_empty = True
+        for tile, group, values, known, shows in warp.tiles(pool, workers + 1, pixels):
             file.write(values, group, window=tile, valid=known)
+            is_empty &= not shows
     progress.update(1.0)
+    return not is_empty
 
 
 def warp_to_array(
@@ -221,7 +226,7 @@ def warp_to_array(
     values = np.empty((source.count, target.height, target.width), source.dtype)
     valid = np.ones(values.shape[1:], bool)
     with ThreadPoolExecutor(workers) as pool:
-        for tile, group, part, known in warp.tiles(pool, workers + 1, progress):
+        for tile, group, part, known, _ in warp.tiles(pool, workers + 1, progress):
             rows, cols = tile.slices
             values[group[0] - 1 : group[-1], rows, cols] = part
             if group is warp.groups[0]:

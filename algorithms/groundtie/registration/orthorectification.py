@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..context import Context
+from ..errors import NoOverlapError
 from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid
 from ..rasters.target_grids import covering_grid, registered_grid
@@ -41,7 +42,7 @@ def write_orthoimage(
     Raises
     ------
     NoOverlapError
-        The image shows nothing of the grid that was given.
+        The image shows nothing of the grid that was given, or no height is known there.
     """
     source, by = image.source, image.orientation
     if grid is None:
@@ -53,5 +54,9 @@ def write_orthoimage(
         outline = turned(by.to_nominal_map(source.grid.outline()), by.crs, middle)
         covering_grid(grid, outline, within=True)
     dense, workers, progress = DenseOrientation(by), context.workers, context.progress
-    warp_raster(source, dense, grid, path, resampling, workers=workers, progress=progress)
+    if not warp_raster(source, dense, grid, path, resampling, workers=workers, progress=progress):
+        raise NoOverlapError(
+            f"the orthoimage would hold no data: where its grid shows {source.path}, the height of "
+            "the ground is not known, or the RPCs do not hold there"
+        )
     return grid

@@ -14,7 +14,7 @@ from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.geoids import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
-from ..sensor.rpc import RPC
+from ..sensor.rpc import RPC, VALID_RANGE
 from ..sensor.rpc_files import rpc_of
 
 
@@ -64,6 +64,14 @@ class Ground:
         height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
+    def _require_range(self, rpc: RPC) -> None:
+        offset, reach = rpc.offset[2], VALID_RANGE * abs(rpc.scale[2])
+        if self.height_m is not None and abs(self.height_m - offset) > reach:
+            raise ParameterError(
+                f"the RPCs do not hold at a height of {self.height_m:g} m, only from "
+                f"{offset - reach:.0f} to {offset + reach:.0f} m above the ellipsoid"
+            )
+
     def orient(
         self,
         source: RasterSource,
@@ -79,7 +87,8 @@ class Ground:
         Raises
         ------
         ParameterError
-            The terrain model itself names another vertical datum.
+            The terrain model itself names another vertical datum, or the RPCs do not hold at the
+            height.
         GeoreferencingError, NoOverlapError, RasterContentError
             See `orient` and `find_geoid`.
         """
@@ -87,6 +96,7 @@ class Ground:
         def opened(path: Path) -> RasterSource:
             return stack.enter_context(open_raster(path))
 
+        self._require_range(rpc)
         crs, geoid = crs or _utm_of(source, rpc), self.geoid
         if geoid is None and self.datum is not None:
             geoid = find_geoid(self.datum)
