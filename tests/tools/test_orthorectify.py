@@ -216,6 +216,22 @@ def test_parameters_that_do_not_go_together(
     assert not files["output"].exists()
 
 
+@pytest.mark.parametrize("datum", ["ellipsoidal", "EGM96"])
+@pytest.mark.parametrize(
+    ("vertical", "name"), [("5783", "DHHN92"), ("5703", "NAVD88"), ("5798", "EGM84")]
+)
+def test_a_terrain_model_of_another_datum_needs_its_geoid(
+    files: dict[str, Path], tmp_path: Path, vertical: str, name: str, datum: str
+) -> None:
+    files["dem"] = write_dem(tmp_path / "dem.tif", f"EPSG:32632+{vertical}")
+    with pytest.raises(ParameterError, match=f"count from {name} height, not {datum}: give"):
+        groundtie.orthorectify(**files, dem_datum=datum)
+    assert not files["output"].exists()
+    grid = Grid(Affine(0.25, 0, 8, 0, -0.25, 46), CRS.from_epsg(4326), 9, 9)
+    geoid = write_raster(tmp_path / "geoid.tif", np.zeros((9, 9), np.float32), grid)
+    assert groundtie.orthorectify(**files, geoid=geoid).output.exists()
+
+
 def test_an_image_without_rpcs_writes_nothing(files: dict[str, Path]) -> None:
     write_raster(files["image"], np.ones((20, 20), np.uint8))
     with pytest.raises(GroundTieError, match="has no RPCs"):

@@ -97,17 +97,18 @@ class Ground:
             return stack.enter_context(open_raster(path))
 
         self._require_range(rpc)
-        crs, geoid = crs or _utm_of(source, rpc), self.geoid
-        if geoid is None and self.datum is not None:
-            geoid = find_geoid(self.datum)
         dem = None if self.dem is None else opened(self.dem)
-        declared = None if dem is None else declared_datum(dem)
+        declared = None if dem is None else declared_datum(dem.grid.crs)
         if declared is not None and self.datum is not None and declared != self.datum:
             raise ParameterError(
                 f"{self.dem} states that its heights count from {declared}, not {self.datum}"
+                + ("" if declared in DATUMS else ": give the grid of that datum's geoid (geoid)")
             )
+        geoid = self.geoid
+        if geoid is None and self.datum is not None:
+            geoid = find_geoid(self.datum)
         grid = None if geoid is None else opened(geoid)
-        found = orient(source, rpc, crs, dem, grid, self.height_m)
+        found = orient(source, rpc, crs or _utm_of(source, rpc), dem, grid, self.height_m)
         if found.known_share < self.least_cover:
             raise NoOverlapError(
                 f"{self.dem} covers only {_percent(found.known_share)} of the area of "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +13,7 @@ import rasterio
 from ..errors import GeoreferencingError
 
 if TYPE_CHECKING:
-    # The tool doctor looks for geoids where OpenCV, which reading needs, is missing.
-    from ..rasters.reading import RasterSource
+    from rasterio.crs import CRS
 
 ELLIPSOIDAL = "ellipsoidal"
 
@@ -22,16 +22,24 @@ _GRIDS = {
     "EGM96": ("us_nga_egm96_15.tif", "egm96_15.gtx"),
     "EGM2008": ("us_nga_egm08_25.tif", "egm08_25.gtx"),
 }
+
+# The name of the vertical part of a compound CRS, in WKT 1 or 2.
+_VERTICAL = re.compile(r'\bVERT(?:_CS|CRS)\["([^"]*)"', re.IGNORECASE)
+_NO_DATUM = re.compile(r"^$|unknown|unnamed|ellipsoid", re.IGNORECASE)
+
 DATUMS = (ELLIPSOIDAL, *_GRIDS)
 
 
-def declared_datum(dem: RasterSource) -> str | None:
-    """Return the vertical datum that a terrain model's compound CRS names, if it is a known one."""
-    crs = dem.grid.crs
-    text = "" if crs is None else str(crs.to_wkt()).upper().replace(" ", "")
-    if "VERT_CS" not in text and "VERTCRS" not in text:
+def declared_datum(crs: CRS | None) -> str | None:
+    """Return what heights count from that a compound CRS names: a name of `DATUMS`, or its own.
+
+    None: it names nothing, or the ellipsoid.
+    """
+    found = None if crs is None else _VERTICAL.search(crs.to_wkt())
+    if found is None or _NO_DATUM.search(found[1]):
         return None
-    return next((name for name in _GRIDS if name in text), None)
+    text = found[1].upper().replace(" ", "")
+    return next((name for name in _GRIDS if name in text), found[1])
 
 
 def find_geoid(datum: str) -> Path | None:
