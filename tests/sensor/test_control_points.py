@@ -104,6 +104,41 @@ def test_the_georeferencer_has_an_images_own_geotransform(
     np.testing.assert_allclose(bare.points.input_px, points.points.input_px, atol=1e-6)
 
 
+@pytest.mark.parametrize("crs", ["EPSG:32632+5773", "EPSG:32632+5783"])
+def test_heights_that_do_not_count_from_the_ellipsoid_are_refused(
+    tmp_path: Path, located: tuple[Orientation, Grid], crs: str
+) -> None:
+    points = some_points(located[0])
+    columns = [points.points.reference_xy, points.points.input_px, points.height_m[:, None]]
+    lines = ["reference_x,reference_y,input_col,input_row,height_m,reference_crs"]
+    lines += [",".join(f"{v:.6f}" for v in row) + f",{crs}" for row in np.hstack(columns)]
+    table = tmp_path / "a.csv"
+    table.write_text("\n".join(lines))
+    with pytest.raises(TransformFileError, match=r"heights above (EGM96|DHHN92 height), but"):
+        read_control_points(table, *located)
+    # Without heights there is nothing to mistake.
+    table.write_text("\n".join(lines).replace("height_m", "unused"))
+    found = read_control_points(table, *located)
+    np.testing.assert_allclose(found.height_m, points.height_m - 2.5, atol=1e-3)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".gpkg", ".geojson", ".txt"])
+def test_points_of_a_compound_map_are_written_without_its_vertical_part(
+    tmp_path: Path, located: tuple[Orientation, Grid], suffix: str
+) -> None:
+    """Their heights count from the ellipsoid, whatever those of the reference do."""
+    compound = CRS.from_user_input("EPSG:32632+5773")
+    points = replace(some_points(located[0]), crs=compound)
+    path = tmp_path / f"points{suffix}"
+    points.write(path, replace(located[0], crs=compound), located[1])
+    if suffix == ".txt":
+        assert path.read_text().startswith("-a_srs EPSG:32632\n")
+        return
+    found = read_control_points(path, *located)
+    assert found.crs == UTM
+    np.testing.assert_allclose(found.height_m, points.height_m, atol=1e-6)
+
+
 def test_gdal_takes_its_options(tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
     """Columns and rows count from the corner, as GDAL has them."""
     points = some_points(located[0])

@@ -23,6 +23,7 @@ from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject
 from .adjustment import Control
 from .control_formats import GDAL_FIRST, HEIGHT, read_others
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
+from .geoids import declared_datum, horizontal
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
 
@@ -85,13 +86,18 @@ class ControlPoints:
         """Write the points in the format that the suffix of `path` names (see `SUFFIXES`).
 
         Residuals and lines refer to `orientation`: lines lead from where it sees a point on the
-        map to where the point is. `grid` is the image's own.
+        map to where the point is. `grid` is the image's own. What the CRS of the map may state
+        of heights is left out: those of points count from the ellipsoid.
 
         Raises
         ------
         OutputError
             The file cannot be written, or its suffix is not known.
         """
+        crs = horizontal(self.crs)
+        if crs != self.crs:
+            replace(self, crs=crs).write(path, replace(orientation, crs=crs), grid)
+            return
         if Path(path).suffix.lower() == GDAL_SUFFIX:
             with writing(path):
                 Path(path).write_text(self._gdal_options(), encoding="utf-8")
@@ -145,7 +151,8 @@ def read_control_points(
     Raises
     ------
     TransformFileError
-        The file cannot be read or understood, or holds no points.
+        The file cannot be read or understood, holds no points, or its CRS states that their heights
+        do not count from the ellipsoid.
     """
     stored = read_others(path, image)
     if stored is None:
@@ -158,6 +165,12 @@ def read_control_points(
         raise TransformFileError(f"{path} holds no points")
     crs = stored.crs or orientation.crs
     height = stored.more[HEIGHT]
+    datum = declared_datum(crs)
+    if datum is not None and np.isfinite(height).any():
+        raise TransformFileError(
+            f"{path} states heights above {datum}, but those of control points count from the "
+            "ellipsoid: convert them, or leave the heights out to take the terrain model's"
+        )
     lon_lat = reproject(stored.reference_xy, crs, LON_LAT)
     height = np.where(np.isfinite(height), height, orientation.heights.at(lon_lat))
     state = np.where(stored.used, USED, "rejected: in the file").astype(object)

@@ -26,6 +26,7 @@ _GRIDS = {
 # The name of the vertical part of a compound CRS, in WKT 1 or 2.
 _VERTICAL = re.compile(r'\bVERT(?:_CS|CRS)\["([^"]*)"', re.IGNORECASE)
 _NO_DATUM = re.compile(r"^$|unknown|unnamed|ellipsoid", re.IGNORECASE)
+_COMPOUND = re.compile(r'COMPD_CS\["[^"]*",(.*),VERT_CS\[', re.DOTALL)
 
 DATUMS = (ELLIPSOIDAL, *_GRIDS)
 
@@ -40,6 +41,12 @@ def declared_datum(crs: CRS | None) -> str | None:
         return None
     text = found[1].upper().replace(" ", "")
     return next((name for name in _GRIDS if name in text), found[1])
+
+
+def horizontal(crs: CRS) -> CRS:
+    """Return a compound CRS without its vertical part; others as they are."""
+    found = _COMPOUND.match(crs.to_wkt())
+    return crs if found is None else type(crs).from_wkt(found[1])
 
 
 def find_geoid(datum: str) -> Path | None:
