@@ -117,6 +117,14 @@ def test_rpc00a_has_the_same_polynomials_in_another_order(tmp_path: Path) -> Non
     text = re.sub(r"(\w+Coef = )\(([^)]*)\)", reordered, text)
     (tmp_path / "a.rpb").write_text(text)
     assert read_rpc(tmp_path / "a.rpb") == CAMERA
+    # GDAL finds such a file beside an image, too, but takes its terms for those of RPC00B.
+    image = write_image(tmp_path / "a.tif")
+    with open_raster(image, allow_sensor_geometry=True) as source:
+        assert rpc_from_tags(source.tags["RPC"], "a") != CAMERA
+        assert rpc_of(source) == CAMERA
+    image = write_image(tmp_path / "b.tif")
+    with open_raster(image, allow_sensor_geometry=True) as source:
+        assert_same(rpc_of(source), CAMERA)
 
 
 def monomials_at(lon: float, lat: float, height: float) -> np.ndarray:

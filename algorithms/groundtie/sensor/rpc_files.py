@@ -75,7 +75,18 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
         raise GeoreferencingError(
             f"{source.path} has no RPCs; give the file that holds them (_RPC.TXT, .RPB, RPC .XML)"
         )
+    for name in source.files():
+        # GDAL takes the terms of RPC00A for those of RPC00B.
+        if name.lower().endswith(".rpb") and _is_rpc00a(Path(name)):
+            return read_rpc(name)
     return rpc_from_tags(tags, source.path)
+
+
+def _is_rpc00a(path: Path) -> bool:
+    # What lies in an archive is left to GDAL.
+    if not path.is_file():
+        return False
+    return _spec_id(path.read_text(encoding="utf-8", errors="replace")) == "RPC00A"
 
 
 def read_rpc(path: str | os.PathLike[str]) -> RPC:
@@ -137,14 +148,19 @@ def _write_text(tags: Tags) -> str:
 
 def _read_rpb(text: str) -> Tags:
     """Read `.RPB`: statements with an equals sign, lists in brackets, in a group IMAGE."""
-    found = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
-    kind = found[1].upper() if found else "RPC00B"
+    kind = _spec_id(text)
     if kind not in ("RPC00A", "RPC00B"):
         raise ValueError(f"coefficients of kind {kind} are not supported, only RPC00A and RPC00B")
     # From the start of a word only: a text of one long word is none of quadratic work.
     pairs = re.findall(r"\b(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
     tags = {_RPB_NAMES[key]: value.strip("() \r;") for key, value in pairs if key in _RPB_NAMES}
     return _from_rpc00a(tags) if kind == "RPC00A" else tags
+
+
+def _spec_id(text: str) -> str:
+    """Return which order of coefficients an `.RPB` states, RPC00B by default."""
+    found = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
+    return found[1].upper() if found else "RPC00B"
 
 
 def _from_rpc00a(tags: Tags) -> Tags:
