@@ -138,6 +138,27 @@ def test_dimap_3_states_what_it_counts_from(tmp_path: Path, first: int) -> None:
     assert_same(read_rpc(tmp_path / "RPC.XML"), CAMERA)
 
 
+@pytest.mark.parametrize(
+    ("name", "is_whole"),
+    [("IMG_PNEO_R1C1.TIF", True), ("IMG_PNEO.TIF", True), ("IMG_R1C2.TIF", False),
+     ("img_r2c1.tif", False), ("IMG_R11C1.TIF", False)],
+)  # fmt: skip
+def test_the_rpcs_of_a_whole_image_are_not_those_of_its_tiles(
+    tmp_path: Path, name: str, is_whole: bool
+) -> None:
+    """They would lie off by the tile's first row and column."""
+    (tmp_path / "RPC.XML").write_text(dimap_3(CAMERA, 0, 0))
+    write_rpc(tmp_path / "own_RPC.TXT", CAMERA)
+    with open_raster(write_image(tmp_path / name, CAMERA), allow_sensor_geometry=True) as source:
+        # A file of the tile's own.
+        assert_same(rpc_of(source, tmp_path / "own_RPC.TXT"), CAMERA)
+        if is_whole:
+            assert_same(rpc_of(source, tmp_path / "RPC.XML"), CAMERA)
+        else:
+            with pytest.raises(GeoreferencingError, match=r"is a tile .*RPC\.XML .* beside"):
+                rpc_of(source, tmp_path / "RPC.XML")
+
+
 def test_dimap_3_that_counts_from_anywhere_is_refused(tmp_path: Path) -> None:
     for firsts in ((0, 1), (-27, -791)):
         (tmp_path / "RPC.XML").write_text(dimap_3(CAMERA, *firsts))

@@ -24,6 +24,9 @@ Tags = dict[str, str]
 # among the squares, and cubic terms by the power of longitude, latitude and height.
 _RPC00A = (0, 1, 2, 3, 4, 5, 6, 10, 7, 8, 9, 11, 14, 17, 12, 15, 18, 13, 16, 19)
 
+# How the names of tiles of DIMAP products end: row and column. The first begins as the image.
+_TILE = re.compile(r"_R(\d+)C(\d+)$", re.IGNORECASE)
+
 # Names in .RPB files, and those in GDAL's domain.
 _RPB_NAMES = {
     "errBias": "ERR_BIAS",
@@ -66,9 +69,11 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
     Raises
     ------
     GeoreferencingError
-        There are none, or they cannot be understood.
+        There are none, they cannot be understood, or they are of the image of which the raster is
+        a tile.
     """
     if path is not None:
+        _require_whole(source, path)
         return read_rpc(path)
     tags = source.tags.get("RPC")
     if not tags:
@@ -80,6 +85,16 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
         if name.lower().endswith(".rpb") and _is_rpc00a(Path(name)):
             return read_rpc(name)
     return rpc_from_tags(tags, source.path)
+
+
+def _require_whole(source: RasterSource, path: str | os.PathLike[str]) -> None:
+    tile = _TILE.search(Path(source.path).stem)
+    if Path(path).suffix.lower() == ".xml" and tile and (int(tile[1]), int(tile[2])) != (1, 1):
+        raise GeoreferencingError(
+            f"{source.path} is a tile of an image, and {path} holds the RPCs of all of it: put the "
+            "product's DIM_….XML and RPC_….XML beside the tile, where GDAL finds and shifts them, "
+            "and give no RPC file"
+        )
 
 
 def _is_rpc00a(path: Path) -> bool:
