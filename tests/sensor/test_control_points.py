@@ -78,6 +78,13 @@ def test_the_georeferencers_points_get_the_grounds_height(
     np.testing.assert_allclose(found.points.input_px, points.points.input_px, atol=1e-6)
     np.testing.assert_allclose(found.height_m, points.height_m - 2.5, atol=1e-6)
     np.testing.assert_allclose(found.points.covariance_px2, [np.eye(2)] * len(points))
+    lines = (tmp_path / "a.points").read_text().splitlines()[2:]
+    numbers = np.array([line.split(",")[5:] for line in lines], float)
+    residual = points.points.input_px - located[0].to_px(points.points.reference_xy)
+    # Its rows count upwards.
+    np.testing.assert_allclose(numbers[:, :2], residual * [1, -1], atol=1e-6)
+    np.testing.assert_allclose(numbers[:, 2], np.hypot(*residual.T), atol=1e-6)
+    assert numbers[:, 2].max() < 5
     # It knows no check points: they are switched off.
     assert found.points.used.tolist() == (points.points.used & ~points.points.is_check).tolist()
 

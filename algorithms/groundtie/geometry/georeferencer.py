@@ -19,9 +19,14 @@ SUFFIX = ".points"
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
 
 
-def write_georeferencer(path: Path, points: TiePoints, transform: Transform) -> None:
-    """Write points for the Georeferencer, in which only used points of the fit are enabled."""
-    source_xy = _source_grid(transform.input_grid).pixel_to_map(points.input_px)
+def write_georeferencer(
+    path: Path, points: TiePoints, transform: Transform, own_grid: Grid | None = None
+) -> None:
+    """Write points for the Georeferencer, in which only used points of the fit are enabled.
+
+    `own_grid` is where it places the input, if that is not the transform's grid.
+    """
+    source_xy = _source_grid(own_grid or transform.input_grid).pixel_to_map(points.input_px)
     residual = points.residual_px(transform)
     lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
     lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")

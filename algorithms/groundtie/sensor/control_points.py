@@ -13,6 +13,7 @@ from rasterio.crs import CRS
 
 from ..errors import TransformFileError
 from ..geometry.georeferencer import SUFFIX as GEOREFERENCER
+from ..geometry.georeferencer import write_georeferencer
 from ..geometry.point_tables import SIGMA
 from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
@@ -102,13 +103,16 @@ class ControlPoints:
             with writing(path):
                 Path(path).write_text(self._gdal_options(), encoding="utf-8")
             return
-        own: Grid = SensorGrid(grid.transform, self.crs, grid.width, grid.height, orientation)
+        seen = SensorGrid(grid.transform, self.crs, grid.width, grid.height, orientation)
+        transform = Transform.nominal(self.crs, seen)
         if Path(path).suffix.lower() == GEOREFERENCER:
-            own = grid  # which it has places in the image by
+            with writing(path):
+                # It has places in the image where the image's own grid has them.
+                write_georeferencer(Path(path), self.points, transform, grid)
+            return
         covariance = self.points.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
         more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma, **self.points.more}
-        transform = Transform.nominal(self.crs, own)
         write_tie_points(path, replace(self.points, more=more), transform)
 
     def _gdal_options(self) -> str:
