@@ -100,3 +100,25 @@ def test_arrays_have_the_unit_of_their_crs() -> None:
     assert in_metres(values, open_raster(Raster(values, place, UTM))) is values
     in_feet = in_metres(values, open_raster(Raster(values, place, FEET)))
     np.testing.assert_allclose(in_feet, 1000 * 1200 / 3937, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [
+        ("US survey foot", 1200 / 3937),
+        ("foot (US survey)", 1200 / 3937),
+        ("Foot_US", 1200 / 3937),
+        ("us-ft", 1200 / 3937),
+        ("survey feet", 1200 / 3937),
+        ("feet", 0.3048),
+        ("foot (international)", 0.3048),
+        ("International Feet", 0.3048),
+    ],
+)
+def test_feet_have_many_names(tmp_path: Path, unit: str, metres: float) -> None:
+    path = write_raster(tmp_path / "dem.tif", np.full((4, 5), 1000, np.float32))
+    with rasterio.open(path, "r+") as dataset:
+        dataset.units = (unit,)
+    with open_raster(path) as source:
+        heights, _ = read_heights(source, source.window)
+    np.testing.assert_allclose(heights, 1000 * metres, rtol=1e-6)

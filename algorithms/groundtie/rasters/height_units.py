@@ -20,11 +20,15 @@ _UNITS_M = {
     **dict.fromkeys(("dm", "decimetre", "decimetres", "decimeter", "decimeters"), 0.1),
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 0.001),
     **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1000.0),
-    **dict.fromkeys(("ft", "foot", "feet", "internationalfoot", "internationalfeet"), _FOOT_M),
-    **dict.fromkeys(
-        ("usft", "ftus", "usfoot", "footus", "usfeet", "ussurveyfoot", "ussurveyfeet"),
-        _SURVEY_FOOT_M,
-    ),
+    **{
+        name.format(foot): metres
+        for foot in ("ft", "foot", "feet")
+        for metres, names in (
+            (_FOOT_M, ("{}", "international{}", "{}international")),
+            (_SURVEY_FOOT_M, ("us{}", "{}us", "ussurvey{}", "{}ussurvey", "survey{}")),
+        )
+        for name in names
+    },
 }
 
 # The unit of a vertical CRS, in WKT 1 or 2, follows its datum, which has none.
