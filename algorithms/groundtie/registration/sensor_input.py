@@ -17,6 +17,9 @@ from ..sensor.orientation import Orientation, orient, seen_at
 from ..sensor.rpc import RPC, VALID_RANGE
 from ..sensor.rpc_files import rpc_of
 
+# Filled voids of less of an image are not stated: rims are known to reduced pixels.
+_LEAST_FILLED = 0.005
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -59,7 +62,8 @@ class Ground:
         if self.dem is not None:
             share, filled = orientation.known_share, orientation.filled_share
             partly = "" if share == 1 else f", which covers {_percent(share)} of the image"
-            voids = f"; {_percent(filled)} are voids that are filled" if filled else ""
+            has_voids = filled >= _LEAST_FILLED
+            voids = f"; {_percent(filled)} are voids that are filled" if has_voids else ""
             return f"heights of {self.dem} above {self.datum or self.geoid}{partly}{voids}"
         height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
