@@ -304,7 +304,7 @@ def test_a_second_signal_ends_in_one_line_what_takes_no_notice_of_the_first(
 
     if not started:
         monkeypatch.setattr(click.Group, "parse_args", busy)
-    assert main(GOOD.split(), tools=[dataclasses.replace(TOY, run=busy)]) == 128 + number
+    assert run_tools(GOOD.split(), [dataclasses.replace(TOY, run=busy)]) == 128 + number
     assert capsys.readouterr() == ("", "groundtie: error: cancelled\n")
 
 
