@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .effects import Effect, Shape, each_band, effect
 from .overlays import Canvas, Overlay, overlay, smooth_noise
@@ -80,6 +81,30 @@ def heat_map(shape: Shape, rng: np.random.Generator) -> Overlay:
     steps = np.floor(heat * rng.uniform(1, 3))
     alpha = np.where(steps > 0, rng.uniform(0.25, 0.6), 0.0)
     return Overlay(np.clip(80 + 45 * steps, 0, 255), alpha)
+
+
+@overlay("shaded relief")
+def shaded_relief(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Lay the shading of a rugged terrain over the image, as layers of a web map are."""
+    heights = sum(size * smooth_noise(shape, size, rng) for size in (3.0, 6.0, 12.0, 24.0))
+    down, right = np.gradient(np.asarray(heights) * rng.uniform(0.5, 1.0))
+    azimuth, height = np.deg2rad([rng.uniform(0, 360), 45.0])
+    toward = np.cos(height) * (right * np.cos(azimuth) + down * np.sin(azimuth))
+    shade = (np.sin(height) + toward) / np.sqrt(1 + right**2 + down**2)
+    opacity = np.full(shape, rng.uniform(0.3, 0.55))
+    return Overlay(255 * np.clip(shade, 0, 1), opacity)
+
+
+@overlay("areas of a map")
+def areas(shape: Shape, rng: np.random.Generator) -> Overlay:
+    """Tint the image by areas of one value each, as a map of statistics does."""
+    count = int(shape[0] * shape[1] / rng.uniform(30, 70) ** 2) + 4
+    towns = rng.uniform(0, 1, (count, 2)) * shape
+    pixels = np.stack(np.indices(shape), axis=-1).reshape(-1, 2)
+    bent = pixels + 5 * np.stack([smooth_noise(shape, 9.0, rng).ravel() for _ in "yx"], axis=-1)
+    nearest = cKDTree(towns).query(bent)[1].reshape(shape)
+    tint = rng.choice([40.0, 90.0, 140.0, 190.0, 240.0], count)[nearest]
+    return Overlay(tint, np.full(shape, rng.uniform(0.35, 0.55)))
 
 
 @overlay("screen of a print")
