@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from contexts import context, one_thread
@@ -13,7 +14,7 @@ from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
 
-__all__ = ["context", "one_thread", "registration", "simulated", "textured"]
+__all__ = ["context", "one_thread", "registration", "simulated", "textured", "wide"]
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +23,12 @@ def registration(textured: TexturedPair) -> Iterator[Registration]:
     spec = Specification(similarity="orientation", search_radius_m=200.0)
     with Call(textured.reference, textured.input, RegistrationFiles()).register(spec) as found:
         yield found
+
+
+@pytest.fixture
+def wide(registration: Registration) -> Registration:
+    """Return that registration as if the images shared only the left half of the grid."""
+    evidence = registration.evidence
+    assert evidence is not None
+    half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)
+    return replace(registration, evidence=replace(evidence, grid=half))

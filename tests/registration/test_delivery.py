@@ -88,18 +88,13 @@ def test_a_refused_registration_writes_its_report_and_raises(
     ],
 )
 def test_what_is_written_beyond_the_overlap_is_stated(
-    registration: Registration,
+    wide: Registration,
     tmp_path: Path,
     context: Context,
     name: str,
     grid: str,
     is_stated: bool,
 ) -> None:
-    """Of the matching grid, the left half is taken for all that the images share."""
-    evidence = registration.evidence
-    assert evidence is not None
-    half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)
-    wide = replace(registration, evidence=replace(evidence, grid=half))
     files = RegistrationFiles(RegisteredOutput(tmp_path / name, grid), report=tmp_path / "r.html")
     found = Call("", "", files).deliver(wide, context, ExitStack())
     (line,) = [line for line in found.lines() if "outside of the overlap" in line] or [""]

@@ -90,18 +90,13 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     ],
 )
 def test_what_is_warped_beyond_the_overlap_is_stated(
-    registration: Registration,
+    wide: Registration,
     tmp_path: Path,
     caplog: pytest.LogCaptureFixture,
     name: str | None,
     grid: str,
     is_stated: bool,
 ) -> None:
-    """Of the matching grid, the left half is taken for all that the images share."""
-    evidence = registration.evidence
-    assert evidence is not None
-    half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)
-    wide = replace(registration, evidence=replace(evidence, grid=half))
     wide.warp(output=None if name is None else tmp_path / name, grid=grid)
     stated = [line for line in caplog.messages if "outside of the overlap" in line]
     assert len(stated) == is_stated
