@@ -10,10 +10,9 @@ import numpy as np
 
 from ..errors import GeoreferencingError
 from ..rasters.atomic import write_csv, writing
-from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, reproject
+from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, near_longitude, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, SMALLEST_PX, round_length
 from ..sensor.control_points import ControlPoints
-from ..sensor.longitudes import turned
 from ..sensor.rpc import RPC
 from .statistics import Statistics
 
@@ -46,7 +45,7 @@ class SensorErrors:
         table = points.points
         seen = rpc.localise(table.input_px, points.height_m)
         moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
-        moved = turned(moved, points.crs, 0.0)
+        moved = near_longitude(moved, 0.0, points.crs)
         error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
         placed = np.isfinite(np.hstack([moved, error_px])).all(axis=1)
         if not placed.all():

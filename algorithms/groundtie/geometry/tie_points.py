@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import FloatArray, Grid, at_longitudes_of
+from ..rasters.grid import FloatArray, Grid, near_longitude
 from .transform import Transform
 
 USED = "used"
@@ -90,7 +90,7 @@ class TiePoints:
         Across the antimeridian, longitudes go on as those of the points do.
         """
         nominal = transform.nominal_xy(self.input_px)
-        return at_longitudes_of(self.reference_xy, nominal, transform.crs)
+        return near_longitude(nominal, self.reference_xy[:, :1], transform.crs)
 
     def residual_px(self, transform: Transform) -> FloatArray:
         """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""

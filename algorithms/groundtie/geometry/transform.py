@@ -18,12 +18,12 @@ from ..rasters.grid import (
     FloatArray,
     Grid,
     PointFunction,
-    at_longitudes_of,
     crs_from_text,
     crs_to_text,
     finite,
     full_turn,
     is_invertible,
+    near_longitude,
     reproject,
 )
 from ..strict_json import read_json
@@ -87,11 +87,11 @@ class Transform:
 
     def _at_model(self, xy: FloatArray) -> FloatArray:
         """Return positions of the reference map, (n, 2), with longitudes as the model has them."""
-        return xy if self._place is None else at_longitudes_of(self._place, xy, self.crs)
+        return xy if self._longitude is None else near_longitude(xy, self._longitude, self.crs)
 
     @cached_property
-    def _place(self) -> FloatArray | None:
-        """Where the model is on a map with longitudes, shape (1, 2).
+    def _longitude(self) -> float | None:
+        """Where the model is on a map with longitudes.
 
         None: it has no place, or the input takes up so much of the Earth that there is no other
         side that its positions could be taken for.
@@ -99,11 +99,11 @@ class Transform:
         turn, frame = full_turn(self.crs), self.model.frame
         if turn is None or frame.to_map == Affine.identity():
             return None
-        place = frame.leave(np.zeros((1, 2)))
+        longitude = float(frame.leave(np.zeros((1, 2)))[0, 0])
         outline = finite(self.nominal_xy(self.input_grid.outline()))
-        longitudes = at_longitudes_of(place, outline, self.crs)[:, 0]
-        is_on_one_side = len(longitudes) > 0 and np.ptp(longitudes) < turn / 2
-        return place if is_on_one_side else None
+        around = near_longitude(outline, longitude, self.crs)[:, 0]
+        is_on_one_side = len(around) > 0 and np.ptp(around) < turn / 2
+        return longitude if is_on_one_side else None
 
     def to_json(self) -> dict[str, Any]:
         """Return the transform as values that JSON can carry."""

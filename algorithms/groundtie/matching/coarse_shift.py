@@ -14,7 +14,7 @@ from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
-from ..rasters.grid import Grid, at_longitudes_of
+from ..rasters.grid import Grid, near_longitude
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
@@ -184,7 +184,7 @@ def _patches(
 def _on_map(transform: Transform, level: Grid) -> Model:
     """Return a transform of degree 1 as a model from map positions to nominal ones."""
     xy = level.pixel_to_map(level.outline(4))
-    nominal = at_longitudes_of(xy, transform.nominal_xy(transform(xy)), transform.crs)
+    nominal = near_longitude(transform.nominal_xy(transform(xy)), xy[:, :1], transform.crs)
     return fit_model("affine", xy, nominal)
 
 

@@ -112,7 +112,7 @@ class Grid:
         moved = reproject(xy, crs, self.crs)
         if not self._is_across_antimeridian:
             return moved
-        return at_longitudes_of(self.pixel_to_map([self.centre_px]), moved, self.crs)
+        return near_longitude(moved, self.pixel_to_map([self.centre_px])[0, 0], self.crs)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -317,26 +317,26 @@ def full_turn(crs: CRS | None) -> float | None:
     return 360 / _degrees_per_unit(crs)
 
 
-def at_longitudes_of(places: FloatArray, xy: FloatArray, crs: CRS | None) -> FloatArray:
-    """Return positions of a map, shape (n, 2), not more than half a turn from others.
+def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | None) -> FloatArray:
+    """Return positions of a map, shape (n, 2), not more than half a turn from a longitude.
 
     Parameters
     ----------
-    places
-        The others, shape (n, 2), or one for all, (1, 2): of the ways to count a longitude, which
-        differ by full turns, positions get the one of these.
     xy
         The positions; of a map without longitudes they stay as they are.
+    longitude
+        One for all, or one for each, shape (n, 1): of the ways to count a longitude, which differ
+        by full turns, positions get the one of this.
     crs
-        CRS of both.
+        CRS of the map.
     """
     turn = full_turn(crs)
     if turn is None:
         return xy
     # Positions outside of a projection's domain are infinite.
     with np.errstate(invalid="ignore"):
-        turns = np.rint((xy[:, :1] - places[:, :1]) / turn)
-    return xy - np.nan_to_num(turns, posinf=0, neginf=0) * [turn, 0]
+        turns = np.nan_to_num(np.rint((xy[:, :1] - longitude) / turn), posinf=0, neginf=0)
+    return np.asarray(xy - turns * [turn, 0]) if turns.any() else xy
 
 
 def _degrees_per_unit(crs: CRS) -> float:

@@ -7,10 +7,9 @@ from pathlib import Path
 from ..context import Context
 from ..errors import NoOverlapError
 from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, near_longitude
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..sensor.dense import DenseOrientation
-from ..sensor.longitudes import turned
 from .sensor_input import OrientedImage
 
 
@@ -51,7 +50,7 @@ def write_orthoimage(
         grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size)
     else:
         middle = grid.pixel_to_map([grid.centre_px])[0, 0]
-        outline = turned(by.to_nominal_map(source.grid.outline()), by.crs, middle)
+        outline = near_longitude(by.to_nominal_map(source.grid.outline()), middle, by.crs)
         covering_grid(grid, outline, within=True)
     dense, workers, progress = DenseOrientation(by), context.workers, context.progress
     if not warp_raster(source, dense, grid, path, resampling, workers=workers, progress=progress):

@@ -11,11 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
-from ..rasters.grid import LON_LAT, POSITION_ERROR_PX, FloatArray, Grid, PointFunction, reproject
+from ..rasters.grid import (
+    LON_LAT,
+    POSITION_ERROR_PX,
+    FloatArray,
+    Grid,
+    PointFunction,
+    near_longitude,
+    reproject,
+)
 from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
 from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
-from .longitudes import turned
 from .smooth_map import smooth_map
 
 # Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
@@ -226,10 +233,10 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     middle, own_middle = (corner + opposite)[0] / 2, grid.pixel_to_map([grid.centre_px])[0, 0]
 
     def exact(places: FloatArray) -> FloatArray:
-        xy = turned(reproject(places, LON_LAT, grid.crs), grid.crs, own_middle)
+        xy = near_longitude(reproject(places, LON_LAT, grid.crs), own_middle, grid.crs)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
     surface = surface_around(source, exact, lon_lat, fill_open=False)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
-    return replace(surface, to_px=lambda places: fast(turned(places, LON_LAT, middle)))
+    return replace(surface, to_px=lambda places: fast(near_longitude(places, middle, LON_LAT)))

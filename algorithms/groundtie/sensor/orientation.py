@@ -11,10 +11,17 @@ from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError
 from ..geometry.terrain_model import LEAST_SLOPE
-from ..rasters.grid import LON_LAT, FloatArray, Grid, PointFunction, crs_name, reproject
+from ..rasters.grid import (
+    LON_LAT,
+    FloatArray,
+    Grid,
+    PointFunction,
+    crs_name,
+    near_longitude,
+    reproject,
+)
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .longitudes import turned
 from .rpc import RPC, ground_lattice
 from .smooth_map import smooth_map
 
@@ -200,12 +207,17 @@ def orient(
     around = _AROUND * (xy.max(axis=0) - xy.min(axis=0))
 
     def exact(places: FloatArray) -> FloatArray:
-        return turned(reproject(places, crs, LON_LAT), LON_LAT, rpc.offset[0])
+        return near_longitude(reproject(places, crs, LON_LAT), rpc.offset[0], LON_LAT)
 
     fast = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
     x = float(np.median(xy[:, 0]))
     return Orientation(
-        rpc, heights, crs, lambda places: fast(turned(places, crs, x)), measured, known - measured
+        rpc,
+        heights,
+        crs,
+        lambda places: fast(near_longitude(places, x, crs)),
+        measured,
+        known - measured,
     )
 
 
@@ -215,7 +227,7 @@ def _on_map(lon_lat: FloatArray, rpc: RPC, crs: CRS) -> FloatArray:
     Longitudes of the map, too, go on across the antimeridian.
     """
     x = reproject(np.array([rpc.offset[:2]]), LON_LAT, crs)[0, 0]
-    return turned(reproject(lon_lat, LON_LAT, crs), crs, x)
+    return near_longitude(reproject(lon_lat, LON_LAT, crs), x, crs)
 
 
 def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:
