@@ -309,23 +309,6 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
 
 
 @pytest.mark.parametrize(
-    ("sharpness", "is_exact", "is_view"),
-    [(2.8, True, True), (3.0, False, True), (3.0, True, False)],
-)
-def test_views_of_two_dates_have_no_sharp_edges_on_whole_pixels(
-    tmp_path: Path, context: Context, sharpness: float, is_exact: bool, is_view: bool
-) -> None:
-    """A hillshade that is drawn over both images varies alike all over, as ground does."""
-    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None
-    views = replace(locked.sameness, sharpness=sharpness, related=0.6, **OF_ONE_GROUND)
-    found = replace(locked, sameness=views, is_exact=is_exact)
-    assert views.is_view
-    assert found.is_explained == is_view
-    assert found.is_drawn != is_view
-
-
-@pytest.mark.parametrize(
     ("sharpness", "related", "is_drawn"), [(2.8, 0.0, False), (3.0, 0.0, True), (3.0, 0.8, False)]
 )
 def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(

@@ -95,9 +95,7 @@ class LockedContent:
         """
         if self.sensors is Sensors.DIFFERENT:
             return False
-        # Views of other dates have blurred edges, or lie on fractions of a pixel.
-        is_image = not (self.is_exact and self.sameness.has_sharp_edges)
-        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view and is_image
+        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
         return is_view or self.sameness.is_copy
 
     @property
