@@ -20,6 +20,7 @@ from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject, requi
 from ..runs import run_tags
 from ..strict_json import read_json
 from .drawn_points import follow_lines, line_ends
+from .georeferencer import SUFFIX as GEOREFERENCER
 from .georeferencer import read_georeferencer, write_georeferencer
 from .point_tables import (
     INPUT,
@@ -40,7 +41,7 @@ from .transform import Transform
 from .vector_layers import read_vector_layer, write_vector_layer
 
 _LOG = logging.getLogger(__name__)
-SUFFIXES = (".gpkg", ".geojson", ".csv", ".points")
+SUFFIXES = (".gpkg", ".geojson", ".csv", GEOREFERENCER)
 _LAYER = "tie_points"
 EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
@@ -72,7 +73,7 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
     path = Path(path)
     suffix = _suffix(path, "written as", OutputError)
     with writing(path):
-        if suffix == ".points":
+        if suffix == GEOREFERENCER:
             write_georeferencer(path, points, transform)
             return
         rows, names = _rows(points, transform), (*NUMBERS, *points.more)
@@ -123,7 +124,7 @@ def read_tie_points(
     path = Path(path)
     suffix = _suffix(path, "read from", TransformFileError)
     try:
-        if suffix == ".points":
+        if suffix == GEOREFERENCER:
             points = read_georeferencer(path, input_grid)
             return replace(points, more={name: np.full(len(points), np.nan) for name in more})
         rows, ends, layer_crs = _read_rows(path, suffix)

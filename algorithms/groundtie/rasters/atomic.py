@@ -110,9 +110,10 @@ class Outputs:
         final = Path()
         try:
             for final, staged in self._staged.items():
-                self._keep(final)
+                stale = self._stale(final)
+                self._keep(final, *stale)
                 # Before it is replaced: statistics or a mask of another file would be wrong.
-                for sidecar in self._stale(final):
+                for sidecar in stale:
                     sidecar.unlink()
                 for path in (*_sidecars(staged), staged):
                     place = _beside(final, path.name[len(staged.name) :])
@@ -130,9 +131,9 @@ class Outputs:
             with contextlib.suppress(OSError):
                 _flush(folder)
 
-    def _keep(self, final: Path) -> None:
-        """Give a file and what is beside it a second name, by which to undo that it is replaced."""
-        for old in (final, *self._stale(final)):
+    def _keep(self, *files: Path) -> None:
+        """Give files a second name, by which to undo that they are replaced."""
+        for old in files:
             aside = self._hidden(old, "old")
             # Some disks know no second names: what is replaced there cannot be undone.
             with contextlib.suppress(OSError):
@@ -142,8 +143,9 @@ class Outputs:
     def _stale(self, final: Path) -> list[Path]:
         """Return what lies beside a file and would be wrong for another one of its name."""
         # GDAL takes what RPCs lie beside a raster for the raster's own.
-        rpcs = rpc_files(final) if is_only_raster_of_its_name(final) else []
-        return [*_sidecars(final), *(path for path in rpcs if path not in self._staged)]
+        rpcs = [path for path in rpc_files(final) if path not in self._staged]
+        is_own = bool(rpcs) and is_only_raster_of_its_name(final)
+        return [*_sidecars(final), *(rpcs if is_own else ())]
 
     def _undo(self, made: list[Path]) -> None:
         for path in made:

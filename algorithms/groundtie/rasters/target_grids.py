@@ -101,7 +101,7 @@ def registered_grid(
         )
     if pixel_size_m is None:
         return usual
-    if pixel_size_m > np.max(np.multiply(usual.pixel_sides_m, (usual.width, usual.height))):
+    if pixel_size_m > np.max(np.multiply(usual.pixel_sides_m, usual.size)):
         raise GridSizeError(f"a pixel size of {pixel_size_m:.6g} is larger than the whole raster")
     return _registered_grid(input_grid, px_to_map, crs, pixel_size_m)
 
