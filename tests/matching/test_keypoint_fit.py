@@ -132,9 +132,7 @@ class Astray:
     most_px: float = 7.0
     wrong_px: float = 0.0
 
-    def match(
-        self, coarse: Model, places: object, radius_px: int, context: object
-    ) -> Correspondences:
+    def match(self, coarse: Model, radius_px: int, context: object) -> Correspondences:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
@@ -175,9 +173,9 @@ def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
 @pytest.mark.slow
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
-        whole = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, None, GATE_PX, context)
+        whole = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, GATE_PX, context)
         monkeypatch.setattr(tiles, "_TILE_PX", 128)
-        parts = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, None, GATE_PX, context)
+        parts = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, GATE_PX, context)
 
     def places(matches: Correspondences) -> set[tuple[float, ...]]:
         return {tuple(row) for row in np.rint(np.hstack([matches.px, matches.partner_px]))}
@@ -206,7 +204,7 @@ def test_only_keypoints_on_the_ground_are_matched(files: TexturedPair, tmp_path:
     with files.opened() as pair, open_raster(mask) as ground, threads(2) as context:
         masked = replace(pair, reference=Image(pair.reference.source, None, ground))
         found, everywhere = (
-            KeypointMatcher(pair, *KEYPOINTS, shown=shown).match(COARSE, None, GATE_PX, context)
+            KeypointMatcher(pair, *KEYPOINTS, shown=shown).match(COARSE, GATE_PX, context)
             for shown in (masked, None)
         )
     assert 50 < len(found.px) < len(everywhere.px)

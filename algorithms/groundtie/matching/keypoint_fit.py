@@ -118,7 +118,7 @@ class KeypointFit:
 
     def _match(self, coarse: Model, kind: str, context: Context) -> tuple[Correspondences, Fit]:
         """Return matches of keypoints, few enough of each place, and the model of most of them."""
-        everywhere = self.matcher.match(coarse, None, GATE_PX, context)
+        everywhere = self.matcher.match(coarse, GATE_PX, context)
         found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
         fit = self._fit(kind, found, coarse, context.seed)
         require_no_rival(found, on_grid(coarse, self._grid), fit.model)

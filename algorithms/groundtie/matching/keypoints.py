@@ -17,7 +17,7 @@ from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
-from .matcher import Correspondences, MaskOf, Places
+from .matcher import Correspondences, MaskOf
 
 # A keypoint lies in a part of an image if all within so many of its scales belongs to it.
 _INSIDE_SCALES = 1.5
@@ -53,17 +53,13 @@ class KeypointMatcher:
     held_out: MaskOf | None = None
     shown: ImagePair | None = None
 
-    def match(
-        self, model: Model, places: Places | None, radius_px: int, context: Context
-    ) -> Correspondences:
-        """Return the matches all over the matching grid, as a `matcher.Matcher`.
+    def match(self, model: Model, radius_px: int, context: Context) -> Correspondences:
+        """Return the matches all over the matching grid.
 
         Parameters
         ----------
         model
             The misregistration on the map as known so far.
-        places
-            None: keypoints are their own places.
         radius_px
             How far a partner may lie from where the model predicts it.
         context

@@ -1,9 +1,10 @@
-"""The protocol of all matchers, and what they return.
+"""What matchers look for, and what they return.
 
-A matcher finds where places of the reference lie in the input, given a model that is nearly right:
-`match(model, places, radius_px, context)`. Three fulfil it: `chips.ChipMatcher` (each chip by its
-own similarity surface), `pooled.PooledHistogramMatcher` (chips that share one joint histogram) and
-`keypoints.KeypointMatcher` (keypoints all over the grid). What they find is a `Correspondences`.
+A matcher finds where places of the reference lie in the input, given a model that is nearly right.
+There are three: `chips.ChipMatcher` (each chip by its own similarity surface) and
+`pooled.PooledHistogramMatcher` (chips that share one joint histogram) match `Places` and return
+`ChipSurfaces`; `keypoints.KeypointMatcher` matches keypoints all over the grid and returns
+`Correspondences`.
 """
 
 from __future__ import annotations
@@ -11,13 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..context import Context
-from ..geometry.models import Model
 from ..rasters.grid import FloatArray, Grid, mesh
 from ..similarity.peak import find_peak
 from ..similarity.surface import normalise
@@ -179,12 +177,3 @@ class ChipSurfaces:
         backward = forward if self.backward is self.forward else total(self.backward)
         weights = np.array([self.weight[of].sum() for of in members])
         return ChipSurfaces(centres, forward, backward, weights)
-
-
-class Matcher(Protocol):
-    """What finds where places of the reference lie in the input."""
-
-    def match(
-        self, model: Model, places: Places, radius_px: int, context: Context
-    ) -> Correspondences | ChipSurfaces:
-        """Return the matches of places within a radius of where a model on the map has them."""
