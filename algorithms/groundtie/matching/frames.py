@@ -9,11 +9,6 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 
 
-def on_map(model: Model, grid: Grid) -> Model:
-    """Return a model of a grid's pixel positions as one of map positions."""
-    return model.on_map(grid.centre_transform)
-
-
 def on_grid(model: Model, grid: Grid) -> Affine:
     """Return a model of degree 1 of map positions as an affine transform of a grid's pixels."""
     origin, right, down = grid.map_to_pixel(model(grid.pixel_to_map([[0, 0], [1, 0], [0, 1]])))
@@ -33,7 +28,7 @@ def compose(model: Model, correction: Model, level: Grid) -> Model:
     level
         A grid on the map.
     """
-    corrected = on_map(correction, level)
+    corrected = correction.on_map(level.centre_transform)
     corners = level.pixel_to_map(
         [[0, 0], [level.width, 0], [0, level.height], [level.width, level.height]]
     )

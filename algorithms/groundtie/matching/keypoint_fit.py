@@ -7,7 +7,7 @@ fall anywhere in the gate; a robust fit finds the inliers. Chips may refine thei
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from ..kinds import AUTO
 from ..rasters.grid import FloatArray, Grid, apply_affine
 from .chips import ChipMatcher
 from .feature_fit import Fit, fit_matches, require_no_rival
-from .frames import on_grid, on_map
+from .frames import on_grid
 from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
 from .surface_fit import SurfaceFit
@@ -146,7 +146,7 @@ class KeypointFit:
             if 2 * inliers.sum() <= PARAMETERS["affine"]:
                 raise TooFewPointsError(f"only {inliers.sum()} of {len(inliers)} features agree")
             px, score = matches.px[inliers], matches.score[inliers]
-            coarse = on_map(fit_model("affine", px, first(px)), self._grid)
+            coarse = fit_model("affine", px, first(px)).on_map(self._grid.centre_transform)
             side = float(np.ptp(matches.px, axis=0).max()) / _CHIP_CELLS
             picked = px[best_of_cells(px, score, side, 1)]
             between = far_from(picked, self.chips.layout.fit_centres, side)
@@ -185,7 +185,7 @@ class KeypointFit:
         model, fold_models = fit.model, fit.fold_models
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, nominal, grid, model, _TPS_RADIUS_PX)
-        transform = Transform(on_map(model, grid), nominal.crs, nominal.input_grid)
+        transform = replace(nominal, model=model.on_map(grid.centre_transform))
         return Estimate(transform, points, fold_models)
 
 

@@ -24,7 +24,7 @@ from ..similarity.peak import Peak, find_peak, find_peak_near
 from .alignment import CANDIDATES, Alignment, Prior, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
-from .frames import on_grid, on_map
+from .frames import on_grid
 from .layout import ChipLayout
 from .matcher import ChipSurfaces
 from .pooled import PooledHistogramMatcher
@@ -85,7 +85,7 @@ class SurfaceFit:
         surfaces, aligned, expected = self._align(coarse, kind, context)
         is_flexible = DEGREE.get(aligned.model.kind, 1) > 1
         if not is_flexible and not self.matcher.is_settled(expected):
-            coarse = on_map(aligned.model, pair.grid)
+            coarse = aligned.model.on_map(pair.grid.centre_transform)
             if aligned.model.kind == TERRAIN:
                 # Chips that were displaced by heights have lost them: they justify no more.
                 kind = TERRAIN
@@ -96,7 +96,7 @@ class SurfaceFit:
         nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
         if kind == "tps":
             model, fold_models = fit_thin_plate(points, nominal, pair.grid, model, _NEAR_PX)
-        transform = Transform(on_map(model, pair.grid), nominal.crs, nominal.input_grid)
+        transform = replace(nominal, model=model.on_map(pair.grid.centre_transform))
         inliers = _without_outliers(points, transform, pair)
         if 2 * inliers.used.sum() < PARAMETERS[transform.model.kind]:
             raise TooFewPointsError(
