@@ -46,7 +46,7 @@ def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
         x, y = pair.grid.map_to_pixel(
             grid.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
         ).T
-        held_out = (layout.columns.held_out(x) & layout.rows.held_out(y)).reshape(cols.shape)
+        held_out = layout.held_out(x, y).reshape(cols.shape)
     values = files.reference_values
     noise = np.random.default_rng(9).integers(1, 60_000, values.shape, dtype=np.uint16)
     values = np.where(held_out, 0 if emptied else noise, values).astype(np.uint16)
@@ -95,7 +95,7 @@ def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
     """On its own pixels as the layout says; on larger ones also what they see of a block."""
     held_out = HeldOut.of(pair)
     layout, grid = held_out.layout, pair.grid
-    exact = layout.held_out_mask(np.arange(float(grid.width)), np.arange(float(grid.height)))
+    exact = layout.held_out(np.arange(float(grid.width)), np.arange(float(grid.height))[:, None])
     np.testing.assert_array_equal(held_out(grid), exact)
     window = grid.window(37, 51, 90, 70)
     np.testing.assert_array_equal(held_out(window), exact[51:121, 37:127])
@@ -136,7 +136,7 @@ def test_poses_are_searched_for_without_what_is_held_out_of_a_rotated_reference(
         cols, rows = (np.arange(float(side)) for _ in range(2))
         px = pair.grid.map_to_pixel(grid.pixel_to_map(mesh(cols, rows)))
         layout = held_out.layout
-        hidden = layout.columns.held_out(px[:, 0]) & layout.rows.held_out(px[:, 1])
+        hidden = layout.held_out(*px.T)
         whole = read_windows(*images, (1.0, 1.0)).reference.valid
         windows = read_windows(*images, (1.0, 1.0), held_out=held_out)
         seen = windows.reference

@@ -109,7 +109,7 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
     with files.opened() as pair:
         layout = HeldOut.of(pair).layout
         size = pair.grid.width, pair.grid.height
-        held_out = layout.held_out_mask(*(np.arange(float(n)) for n in size))
+        held_out = layout.held_out(np.arange(float(size[0])), np.arange(float(size[1]))[:, None])
         expected = estimate_of(pair, "affine", refinement)
     values = pixels(files.reference)[0]
     assert held_out.shape == values.shape and 0.15 < held_out.mean() < 0.4
@@ -136,7 +136,7 @@ class Astray:
         grid = self.pair.grid
         sides = [np.arange(30.0, size - 30, 12) for size in (grid.width, grid.height)]
         px = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
-        px = px[~self.held_out.layout.held_out_mask(*sides).ravel()]
+        px = px[~self.held_out.layout.held_out(*px.T)]
         partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
         partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
         partner[:, 0] += self.most_px * px[:, 0] / grid.width

@@ -36,7 +36,8 @@ def pixels_of(centres: np.ndarray, chip: int, size: tuple[int, int]) -> np.ndarr
 
 
 def held_out_of(layout: ChipLayout, size: tuple[int, int]) -> np.ndarray:
-    return layout.held_out_mask(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
+    cols, rows = (np.arange(float(n)) for n in size)
+    return layout.held_out(cols, rows[:, None])
 
 
 SIZES = st.tuples(st.integers(200, 900), st.integers(200, 900))

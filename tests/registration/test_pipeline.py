@@ -86,7 +86,7 @@ def test_a_registration_has_a_transform_points_and_a_verdict(
     stages = Stages.of(
         registration.pair, Masked(registration.pair, registration.mask), registration.spec
     )
-    held_out = stages.held_out.layout.held_out(px)
+    held_out = stages.held_out.layout.held_out(*px.T)
     np.testing.assert_array_equal(held_out, points.is_check)
 
 

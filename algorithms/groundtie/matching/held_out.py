@@ -47,11 +47,11 @@ class HeldOut:
         cols, rows = np.arange(piece.width, dtype=float), np.arange(piece.height, dtype=float)
         reach = self._reach_px(piece)
         if not self._has_axes_of(piece):
-            px = self._matching_px(piece, mesh(cols, rows))
-            return self.layout.held_out(px, reach).reshape(piece.height, piece.width)
+            x, y = self._matching_px(piece, mesh(cols, rows)).T
+            return self.layout.held_out(x, y, reach).reshape(piece.height, piece.width)
         along_cols = self._matching_px(piece, np.column_stack([cols, np.zeros_like(cols)]))
         along_rows = self._matching_px(piece, np.column_stack([np.zeros_like(rows), rows]))
-        return self.layout.held_out_mask(along_cols[:, 0], along_rows[:, 1], reach)
+        return self.layout.held_out(along_cols[:, 0], along_rows[:, 1:], reach)
 
     def _matching_px(self, piece: Grid, px: FloatArray) -> FloatArray:
         return self.grid.map_to_pixel(piece.pixel_to_map(px))

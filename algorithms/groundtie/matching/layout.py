@@ -144,21 +144,15 @@ class ChipLayout:
         )
         return np.asarray(row * self.columns.cells + col)
 
-    def held_out(self, px: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
-        """Return which positions (col, row), (n, 2), are held out, or within reach: (n,)."""
-        cols, rows = px.T
-        return self.columns.held_out(cols, reach_px) & self.rows.held_out(rows, reach_px)
-
-    def held_out_mask(
+    def held_out(
         self, cols: NDArray[np.float64], rows: NDArray[np.float64], reach_px: float = 0.0
     ) -> NDArray[np.bool_]:
-        """Return the mask of what is held out at columns × rows of the matching grid.
+        """Return which positions on the matching grid are held out; shapes broadcast.
 
         Whoever stands for more than its position, as interpolated pixels do, is held out, too,
         if it reaches a held-out block: it lies within `reach_px`.
         """
-        held_out_rows = self.rows.held_out(rows, reach_px)
-        return np.asarray(held_out_rows[:, None] & self.columns.held_out(cols, reach_px)[None, :])
+        return self.columns.held_out(cols, reach_px) & self.rows.held_out(rows, reach_px)
 
 
 def _middle_pixels(centres: NDArray[np.float64], chip_px: int) -> NDArray[np.int_]:
