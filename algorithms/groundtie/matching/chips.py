@@ -17,7 +17,7 @@ from ..rasters.grid import FloatArray, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
-from ..similarity.peak import find_peak
+from ..similarity.peak import peak_shifts
 from ..similarity.surface import (
     SimilaritySettings,
     Surface,
@@ -123,9 +123,8 @@ class ChipMatcher:
         px = surfaces.centres.astype(float)
         reach = NEIGHBOUR_SPACINGS * layout.spacing_px
         supported = propagate(surfaces.combined, surfaces.centres, reach)
-        shifts = np.array([find_peak(surface).shift_px for surface in supported])
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        return find_consensus(px, px + shifts, _CONSENSUS_PX, first_kind, seed)
+        return find_consensus(px, px + peak_shifts(supported), _CONSENSUS_PX, first_kind, seed)
 
     def kind_of(self, kind: str) -> str:
         """Return the kind of model that is fitted where one is asked for."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.chance import agreement_probability, log10_false_alarms
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import distances, find_consensus
-from ..rasters.grid import FloatArray, Grid
-from ..similarity.peak import find_peak
+from ..rasters.grid import Grid
+from ..similarity.peak import peak_shifts
 from .alignment import IDENTITY, align
 from .belief_propagation import propagate
 from .chips import ChipMatcher
@@ -73,11 +72,11 @@ def fit_level(
         return CoarseModel(model, np.inf)
     step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
     supported = propagate(surfaces, centres, 1.5 * float(step.max()))
-    own = _peaks(surfaces)
+    own = peak_shifts(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)
     probability = agreement_probability(_TOLERANCE_PX, radius_px)
-    found = px + _peaks(supported)
+    found = px + peak_shifts(supported)
     for kind, sample in _SAMPLE_OF.items():
         fitted = find_consensus(px, found, _TOLERANCE_PX, kind)
         # Peaks after belief propagation are not independent; only the chips' own are counted.
@@ -108,7 +107,3 @@ def fit_level_pooled(
     shift = found.common_shift_px
     aligned = align(["affine"], found.centres, found.weighted, IDENTITY, lambda px: px + shift)
     return compose(model, aligned.model, level)
-
-
-def _peaks(surfaces: NDArray[np.float32]) -> FloatArray:
-    return np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)

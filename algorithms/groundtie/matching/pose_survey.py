@@ -17,7 +17,7 @@ from ..geometry.models import Model
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
-from ..similarity.peak import find_peak
+from ..similarity.peak import peak_shifts
 from ..similarity.surface import SimilaritySettings
 from .alignment import IDENTITY, Alignment, align
 from .belief_propagation import Surfaces
@@ -160,7 +160,7 @@ def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) ->
     residuals = np.full((len(px), 2), np.inf)
     if min(is_black.sum(), (~is_black).sum()) < _FEWEST:
         return residuals
-    found = px + np.array([find_peak(surface).shift_px for surface in surfaces])
+    found = px + peak_shifts(surfaces)
     for which in (is_black, ~is_black):
         model = _moved(px[~which], surfaces[~which]).model
         residuals[which] = found[which] - model(px[which].astype(float))

@@ -14,7 +14,7 @@ from ..context import Context
 from ..geometry.models import Model
 from ..rasters.grid import FloatArray, Grid
 from ..similarity.order_statistics import robust_deviation
-from ..similarity.peak import find_peak
+from ..similarity.peak import peak_shifts
 from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
@@ -182,5 +182,4 @@ def survey_model(
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
     kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
-    shifts = np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
-    return Survey(places.grid, kept, shifts, surfaces, elsewhere_px)
+    return Survey(places.grid, kept, peak_shifts(surfaces), surfaces, elsewhere_px)

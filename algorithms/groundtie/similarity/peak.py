@@ -65,6 +65,11 @@ def find_peak(surface: Surface) -> Peak:
     return Peak((whole[0] + dx, whole[1] + dy), height, covariance, False)
 
 
+def peak_shifts(surfaces: Surface) -> NDArray[np.float64]:
+    """Return the shifts (x, y) of the highest peaks of surfaces, (n, 2 r + 1, …), shape (n, 2)."""
+    return np.array([find_peak(surface).shift_px for surface in surfaces]).reshape(-1, 2)
+
+
 def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> Peak:
     """Return the highest peak near an expected shift.
 
