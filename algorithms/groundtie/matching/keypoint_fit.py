@@ -35,9 +35,8 @@ from .surface_fit import SurfaceFit
 _CHIP_PX = 81
 _CHIP_SIGMAS, _CHIP_RADIUS_PX = 3.0, (4, 12)
 
-# If a tenth of them moves the model by more than this, they are matched again from where it is
-# then: at most so often in all.
-_FAR_PX = 2.5
+# They are matched again from where the model is then until they move it little: at most so often in
+# all.
 _ROUNDS = 3
 
 # Of the matches in each of so many cells a side the best is refined.
@@ -158,8 +157,7 @@ class KeypointFit:
             places = Places(self._grid, centres, _CHIP_PX)
             found = chips.match(coarse, places, radius, context).correspondences()
             fit = self._fit(kind, found, coarse, context.seed)
-            moved = np.hypot(*(fit.model(picked) - first(picked)).T)
-            if np.quantile(moved, 0.9) <= _FAR_PX:
+            if chips.is_settled(fit.model(picked) - first(picked)):
                 break
         return found, coarse, fit
 
