@@ -148,7 +148,7 @@ def count_chain(case: RealCase) -> ChainCount:
     px = one.position_px, other.position_px
     start = find_consensus(*px, _RANSAC_PX, "similarity")
     area = float(np.pi * GATE_PX**2)
-    model, _ = fit_robustly("affine", *px, np.zeros(len(near)), start, area)
+    model, _ = fit_robustly("affine", *px, 0.0, start, area)
     hybrid = _counts(one, other, model, limit)
     return ChainCount(
         case.name,

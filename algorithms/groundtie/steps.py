@@ -190,7 +190,7 @@ def fit_model(
         kind,
         px,
         nominal_px,
-        np.full(len(px), _USUAL_SIGMA_PX**2),
+        _USUAL_SIGMA_PX**2,
         start,
         (2 * radius_px + 1) ** 2,
     )

@@ -166,7 +166,7 @@ def fit_robustly(
     kind: str,
     xy: FloatArray,
     nominal_xy: FloatArray,
-    variances: FloatArray,
+    variances: FloatArray | float,
     start: Model,
     window_area: float,
 ) -> tuple[Model, Mixture]:
@@ -182,7 +182,7 @@ def fit_robustly(
     xy, nominal_xy
         Pairs of positions, shape (n, 2), pixels.
     variances
-        Variance of each match along an axis, shape (n,), px²; the mixture's own variance
+        Variance of each match along an axis, shape (n,), or of all, px²; the mixture's own variance
         is added, so that no match has much more weight than its model is exact.
     start
         Model to start from, usually `find_consensus`.

@@ -84,18 +84,22 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
         raise TooFewPointsError(f"only {len(px)} features were matched")
     # Where most are outliers, samples of two matches are without one far more often than those of
     # three; the prior has taken out what a similarity lacks.
-    first_kind = kind if kind in ("translation", "rigid") else "similarity"
-    residual = find_consensus(px, matches.partner_px, _CONSENSUS_PX, first_kind, seed)
+    residual = find_consensus(px, matches.partner_px, _CONSENSUS_PX, first_kind(kind), seed)
     start = fit_model("affine", px, apply_affine(prior, residual(px)))
     nominal_px = apply_affine(prior, matches.partner_px)
     if kind == AUTO:
         kind = _choose(px, nominal_px, start, window_area)
-    model, mixture = _fit(kind, px, nominal_px, start, window_area)
+    model, mixture = fit_robustly(kind, px, nominal_px, 0.0, start, window_area)
     agreeing = int(mixture.inliers.sum())
     if 2 * agreeing <= PARAMETERS[kind]:
         raise TooFewPointsError(f"only {agreeing} of {len(px)} features agree with a model")
     weights = np.where(mixture.inliers, mixture.probability, 0.0)
     return Fit(model, fit_without_blocks(kind, px, nominal_px, weights), mixture)
+
+
+def first_kind(kind: str) -> str:
+    """Return the kind of a first model, a similarity at most, of one that is asked for."""
+    return kind if kind in ("translation", "rigid") else "similarity"
 
 
 def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> None:
@@ -142,13 +146,6 @@ def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> N
         )
 
 
-def _fit(
-    kind: str, px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float
-) -> tuple[Model, Mixture]:
-    none = np.zeros(len(px))
-    return fit_robustly(kind, px, nominal_px, none, start, window_area)
-
-
 def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float) -> str:
     """Return the simplest kind of model that the matches justify.
 
@@ -157,7 +154,7 @@ def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: f
 
     def fit(kind: str) -> tuple[str, FloatArray]:
         models = [
-            _fit(kind, px[~block], nominal_px[~block], start, window_area)[0]
+            fit_robustly(kind, px[~block], nominal_px[~block], 0.0, start, window_area)[0]
             for block in left_out_blocks(px)
         ]
         distance = left_out_scores(

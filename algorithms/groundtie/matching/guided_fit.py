@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from ..context import Context
 from ..geometry.estimation import Estimate
 from ..geometry.models import Model
+from .feature_fit import first_kind
 from .keypoint_fit import KeypointFit
 from .surface_fit import SurfaceFit
-
-# Keypoints need agree on no more to predict where chips match; few matches are enough.
-_FIRST_KIND = "similarity"
-_SIMPLER_KINDS = ("translation", "rigid")
 
 
 @dataclass(frozen=True)
@@ -41,6 +38,6 @@ class GuidedFit:
         Parameters and errors as `KeypointFit.estimate` has them; what "auto" chooses from is the
         chips' own.
         """
-        first_kind = kind if kind in _SIMPLER_KINDS else _FIRST_KIND
-        first = self.keypoints.estimate(coarse, first_kind, context.part(0.0, 0.6))
+        # Keypoints need agree on no more to predict where chips match; few matches are enough.
+        first = self.keypoints.estimate(coarse, first_kind(kind), context.part(0.0, 0.6))
         return self.chips.estimate(first.transform.model, kind, context.part(0.6, 1.0))
