@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.reading import FloatImage
+from ..similarity.orientation import ROUNDING
 from .keypoints import Keypoints
 
 # Derivatives along columns and rows, shape (h, w) each, and what estimates them.
@@ -28,9 +29,6 @@ IMAGE_BLUR_PX = 0.5
 
 # A gradient sees what lies within so many scales, but for the Gaussian's tail.
 _SEES_SCALES = 2.5
-
-# Gradients below this share of the largest value are rounding.
-_ROUNDING = 1e-5
 
 # So many keypoints are described at a time.
 _BLOCK = 512
@@ -164,7 +162,7 @@ def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:
 def _gradient(level: FloatImage, seen: NDArray[np.bool_], gradient: GradientOperator) -> Gradient:
     """Return the gradient of a level, zero where masked pixels are seen or all is rounding."""
     along_cols, along_rows = gradient(level)
-    least = np.float32(_ROUNDING * np.abs(level).max())
+    least = np.float32(ROUNDING * np.abs(level).max())
     counts = seen & (along_cols**2 + along_rows**2 > least**2)
     zero = np.float32(0)
     return np.where(counts, along_cols, zero), np.where(counts, along_rows, zero)

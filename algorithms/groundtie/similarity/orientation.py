@@ -33,7 +33,7 @@ _LOG_OFFSET = 0.1
 
 # Gradients below this share of the largest value are rounding: where nothing varies, they would
 # all point the same way.
-_ROUNDING = 1e-5
+ROUNDING = 1e-5
 
 
 def compress(window: Patch) -> NDArray[np.float32]:
@@ -82,7 +82,7 @@ def squared_gradients(
     """
     fields = np.empty((len(scales_px), *compressed.shape), np.complex64)
     largest = np.abs(compressed).max(axis=(-2, -1), keepdims=True, initial=0)
-    rounding = np.float32(_ROUNDING) * largest
+    rounding = np.float32(ROUNDING) * largest
     whole = valid.all()
     # Everything in place, as most of the time is that of memory.
     gx, gy, product, size = np.empty((4, *compressed.shape), np.float32)
