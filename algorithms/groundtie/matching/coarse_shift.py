@@ -49,7 +49,7 @@ class Candidate:
 
 def level_factor(grid: Grid) -> float:
     """Return how much coarser than the matching grid the level of the coarse search is."""
-    return max(max(grid.width, grid.height) / LEVEL_SIDE_PX, 1.0)
+    return max(max(grid.size) / LEVEL_SIDE_PX, 1.0)
 
 
 def coarse_candidates(
@@ -141,7 +141,7 @@ def _places(
     # The true place may lie a pixel of the level further than whole pixels show.
     radius_px = int(np.ceil(radius_m / min(level.pixel_sides_m))) + 1
     # Farther off too little of the images overlaps.
-    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.width, level.height)))
+    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
     reach = radius_px + BORDER_PX
     reference, input = _patches(pair, level, model, reach, held_out, context)
     # What a mask leaves of the input is all that can lie under the reference.

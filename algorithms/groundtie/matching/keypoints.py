@@ -130,5 +130,5 @@ def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
 
     Further beyond the grid mostly nothing is valid, and all that is done there is done in vain.
     """
-    whole = Window(0, 0, grid.width, grid.height)
+    whole = Window(0, 0, *grid.size)
     return tile.widened(gate + MARGIN_PX).common(whole.widened(gate))

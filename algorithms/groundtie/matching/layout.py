@@ -180,8 +180,7 @@ def lay_out_chips(pair: ImagePair) -> ChipLayout:
 
     def layout(parts: int) -> ChipLayout:
         axes = []
-        sizes = (pair.grid.width, pair.grid.height)
-        for size, overlap in zip(sizes, pair.overlap_px, strict=True):
+        for size, overlap in zip(pair.grid.size, pair.overlap_px, strict=True):
             most = max(int((size - chip) / smallest_pitch + 1e-6), 1)
             cells = round(_MOST_CELLS * size / overlap)
             axes.append(Axis(size, chip, int(np.clip(cells, 1, most))))

@@ -63,14 +63,14 @@ def fit_level(
     context
         Threads and progress.
     """
-    chip = int(np.clip(min(level.width, level.height) / 5, *_CHIP_RANGE_PX))
+    chip = int(np.clip(min(level.size) / 5, *_CHIP_RANGE_PX))
     places = Places.spread(
         level, chip, lambda side: np.clip((side - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE)
     )
     centres, surfaces = matcher.match_forward(model, places, radius_px, context)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
-    step = (np.array([level.width, level.height]) - chip) / (_CHIPS_PER_SIDE - 1)
+    step = (np.array(level.size) - chip) / (_CHIPS_PER_SIDE - 1)
     supported = propagate(surfaces, centres, 1.5 * float(step.max()))
     own = peak_shifts(surfaces)
     px = centres.astype(float)

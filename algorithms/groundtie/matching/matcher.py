@@ -45,10 +45,7 @@ class Places:
     @classmethod
     def tiles(cls, grid: Grid, chip_px: int) -> Places:
         """Return chips that cover a grid side by side."""
-        sides = (
-            np.arange(length // chip_px) * chip_px + chip_px // 2
-            for length in (grid.width, grid.height)
-        )
+        sides = (np.arange(side // chip_px) * chip_px + chip_px // 2 for side in grid.size)
         return cls(grid, mesh(*sides).astype(int), chip_px)
 
     @classmethod
@@ -59,7 +56,7 @@ class Places:
         """
         sides = (
             np.linspace(chip_px / 2, length - chip_px / 2, int(count(length)))
-            for length in (grid.width, grid.height)
+            for length in grid.size
         )
         return cls(grid, np.rint(mesh(*sides)).astype(int), chip_px)
 

@@ -175,6 +175,5 @@ def _limited(surfaces: Surfaces) -> Surfaces:
 
 def _where(grid: Grid, px: FloatArray) -> str:
     """Return in which third of a grid along each axis a position (col, row) lies."""
-    size = grid.width, grid.height
-    col, row = (min(int(3 * at / side), 2) for at, side in zip(px, size, strict=True))
+    col, row = (min(int(3 * at / side), 2) for at, side in zip(px, grid.size, strict=True))
     return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"

@@ -115,7 +115,7 @@ def survey_pose(
     if len(kept) >= _FEWEST:
         aligned = _moved(kept, surfaces)
         model, fold_models = compose(model, aligned.model, level), aligned.fold_models
-    elsewhere_px = max(accuracy_share * max(level.width, level.height), POSE_TOLERANCE_PX)
+    elsewhere_px = max(accuracy_share * max(level.size), POSE_TOLERANCE_PX)
     moved = Transform(model, transform.crs, transform.input_grid)
     accuracy_px = elsewhere_px, _EXACT_PX
     surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
@@ -131,7 +131,7 @@ def _covered(grid: Grid, transform: Transform) -> Grid:
     outline = transform.inverse(transform.input_grid.outline())
     px = grid.map_to_pixel(outline)
     px = px[np.isfinite(px).all(axis=1)]
-    size = np.array([grid.width, grid.height])
+    size = np.array(grid.size)
     if len(px) == 0:
         return grid
     low = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int)
@@ -143,7 +143,7 @@ def _places(grid: Grid) -> Places:
     """Return chips side by side on a grid, reduced if it is large."""
     factor = level_factor(grid)
     level = grid if factor == 1 else grid.scaled(factor)
-    chip = max(min(level.width, level.height) // _ALONG, 1)
+    chip = max(min(level.size) // _ALONG, 1)
     return Places.spread(level, chip, lambda side: side // chip)
 
 

@@ -150,7 +150,7 @@ class Survey:
 
 def survey_places(grid: Grid) -> Places:
     """Return chips all over a grid, side by side, or farther apart where it is large."""
-    chip = int(np.clip(min(grid.width, grid.height) / _ALONG, *_CHIP_RANGE_PX))
+    chip = int(np.clip(min(grid.size) / _ALONG, *_CHIP_RANGE_PX))
     return Places.spread(grid, chip, lambda side: np.clip(side // chip, 1, _MOST_ALONG))
 
 
