@@ -18,7 +18,7 @@ from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_lattice, unit_rows
-from .scale_space import Gradient, describe_at_scales
+from .scale_space import Gradient, gradients_at_scales
 
 # Cells a side, and directions of each ([Lowe2004] 6.1).
 CELLS = 4
@@ -57,7 +57,10 @@ class SiftDescriptor:
             shape (n, 128) float32: rows and columns of cells, then directions from columns
             towards rows.
         """
-        return describe_at_scales(compress(window), window.valid, found, sift_rows, LENGTH)
+        rows = np.empty((len(found), LENGTH), np.float32)
+        for which, points, fields in gradients_at_scales(compress(window), window.valid, found):
+            rows[which] = sift_rows(fields, points)
+        return found, rows
 
 
 @cache

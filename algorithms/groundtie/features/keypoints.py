@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,10 +45,6 @@ class Keypoints:
     def take(self, which: Any) -> Keypoints:
         """Return the rows that the index or mask `which` selects."""
         return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
-
-    def with_orientation(self, orientation_rad: FloatArray) -> Keypoints:
-        """Return the keypoints with other orientations, shape (n,)."""
-        return replace(self, orientation_rad=orientation_rad)
 
     def strongest(self, count: int) -> Keypoints:
         """Return at most so many keypoints: those with the largest response, in their order."""

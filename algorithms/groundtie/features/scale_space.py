@@ -18,9 +18,6 @@ from .keypoints import Keypoints
 Gradient = tuple[FloatImage, FloatImage]
 GradientOperator = Callable[[FloatImage], Gradient]
 
-Describe = Callable[[Gradient, Keypoints], FloatImage]
-Orient = Callable[[Gradient, Keypoints], tuple[Keypoints, NDArray[np.int_]]]
-
 # Scale space: layers an octave, the first scale, and how much an image is blurred as it is, as
 # [Lowe2004] has them, and OpenCV.
 LAYERS = 3
@@ -42,16 +39,13 @@ def differences(image: FloatImage) -> Gradient:
     return np.asarray(along_cols, np.float32), np.asarray(along_rows, np.float32)
 
 
-def describe_at_scales(
+def gradients_at_scales(
     image: FloatImage,
     valid: NDArray[np.bool_],
     found: Keypoints,
-    describe: Describe,
-    length: int,
     gradient: GradientOperator = differences,
-    orient: Orient | None = None,
-) -> tuple[Keypoints, FloatImage]:
-    """Return keypoints and their descriptors.
+) -> Iterator[tuple[NDArray[np.intp], Keypoints, Gradient]]:
+    """Yield some keypoints after others, by number and in pixels of the gradient at their scale.
 
     Parameters
     ----------
@@ -59,20 +53,9 @@ def describe_at_scales(
         Grey values and which of them count, shape (h, w).
     found
         Keypoints, shape (n,).
-    describe
-        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale, in
-        whose pixels they are.
-    length
-        How many values a descriptor has.
     gradient
         What estimates the gradient of an image.
-    orient
-        Returns keypoints once for each of their orientations, and which one each is; None: all
-        keep the image's axes.
     """
-    tables = [Keypoints.none()]
-    descriptors = [np.zeros((0, length), np.float32)]
-    owners = [np.zeros(0, int)]
     layer_of = _layer_of(found.scale_px)
     layers = [int(layer) for layer in np.unique(layer_of)]
     distance = distance_to_masked(valid)
@@ -84,17 +67,8 @@ def describe_at_scales(
         for start in range(0, len(own), _BLOCK):
             block = own[start : start + _BLOCK]
             points = found.take(block)
-            local = replace(
-                points, position_px=points.position_px / pixel, scale_px=points.scale_px / pixel
-            )
-            index = np.arange(len(block))
-            if orient is not None:
-                local, index = orient(fields, local)
-            descriptors.append(describe(fields, local))
-            tables.append(points.take(index).with_orientation(local.orientation_rad))
-            owners.append(block[index])
-    order = np.argsort(np.concatenate(owners), kind="stable")
-    return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]
+            position_px, scale_px = points.position_px / pixel, points.scale_px / pixel
+            yield block, replace(points, position_px=position_px, scale_px=scale_px), fields
 
 
 def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: float) -> Gradient:

@@ -6,7 +6,7 @@ for all keypoints at once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -86,7 +86,7 @@ class HaarDescriptor:
 
         def one(points: Keypoints) -> tuple[Keypoints, FloatImage]:
             if not self.upright:
-                points = points.with_orientation(_orientations(sums, points))
+                points = replace(points, orientation_rad=_orientations(sums, points))
             return points, _described(sums, points)
 
         done = list(map(one, blocks) if context is None else context.map(one, blocks))
@@ -160,7 +160,7 @@ def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:
     squared = (lattice**2).sum(axis=1)
     lattice, squared = lattice[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]
     window = np.exp(-squared / (2 * _ORIENTATION_WINDOW_SCALES**2)).astype(np.float32)
-    upright = points.with_orientation(np.zeros(len(points)))
+    upright = replace(points, orientation_rad=np.zeros(len(points)))
     along_cols, along_rows = _wavelets(sums, upright, lattice, _ORIENTATION_HALF_SCALES)
     direction = np.arctan2(along_rows, along_cols)
     bins = np.floor(direction * (_BINS / (2 * np.pi))).astype(np.intp) % _BINS

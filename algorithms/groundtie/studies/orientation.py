@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..features.keypoints import Keypoints
 from ..features.sampling import sampled_gradient, square_lattice
-from ..features.scale_space import Gradient
+from ..features.scale_space import (
+    Gradient,
+    GradientOperator,
+    differences,
+    gradients_at_scales,
+)
+from ..rasters.reading import FloatImage
 
 # Orientation: bins of its histogram, width of its window in scales, how far it reaches in widths,
 # and how high a further peak must be.
@@ -23,7 +32,7 @@ def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np
     half = _REACH_WIDTHS * _ORIENTATION_SCALES
     lattice = square_lattice(half, _ORIENTATION_SAMPLES)
     lattice = lattice[np.hypot(*lattice.T) <= half]
-    upright = points.with_orientation(np.zeros(len(points)))
+    upright = replace(points, orientation_rad=np.zeros(len(points)))
     strength, direction = sampled_gradient(fields, upright, lattice)
     window = np.exp(-(lattice**2).sum(axis=1) / (2 * _ORIENTATION_SCALES**2))
     bins = np.rint(direction * (_BINS / (2 * np.pi))).astype(int) % _BINS
@@ -41,4 +50,40 @@ def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np
     index, at = np.nonzero(peaks)
     low, top, high = before[index, at], smooth[index, at], after[index, at]
     place = at + 0.5 * (low - high) / (low - 2 * top + high)
-    return points.take(index).with_orientation(place * (2 * np.pi / _BINS)), index
+    return replace(points.take(index), orientation_rad=place * (2 * np.pi / _BINS)), index
+
+
+def describe_at_scales(
+    image: FloatImage,
+    valid: NDArray[np.bool_],
+    found: Keypoints,
+    describe: Callable[[Gradient, Keypoints], FloatImage],
+    length: int,
+    upright: bool,
+    gradient: GradientOperator = differences,
+) -> tuple[Keypoints, FloatImage]:
+    """Return keypoints, once for each of their orientations if not upright, and their descriptors.
+
+    Parameters
+    ----------
+    image, valid, found, gradient
+        As `gradients_at_scales` takes them.
+    describe
+        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale, in
+        whose pixels they are.
+    length
+        How many values a descriptor has.
+    upright
+        Whether keypoints keep the image's axes.
+    """
+    owners, tables = [np.zeros(0, int)], [Keypoints.none()]
+    descriptors = [np.zeros((0, length), np.float32)]
+    for owner, points, fields in gradients_at_scales(image, valid, found, gradient):
+        if not upright:
+            points, index = oriented(fields, points)
+            owner = owner[index]
+        owners.append(owner)
+        tables.append(replace(found.take(owner), orientation_rad=points.orientation_rad))
+        descriptors.append(describe(fields, points))
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]

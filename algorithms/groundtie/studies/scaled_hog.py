@@ -9,11 +9,11 @@ import numpy as np
 from ..features.hog import CELLS, PATCH_PX, directed_shares, weights_along
 from ..features.keypoints import Keypoints
 from ..features.sampling import sampled_gradient, square_lattice, unit_rows
-from ..features.scale_space import Gradient, describe_at_scales, differences
+from ..features.scale_space import Gradient
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
-from .orientation import oriented
+from .orientation import describe_at_scales
 
 # A patch has a sample every so many scales: it is as wide as SURF's descriptor.
 _SAMPLE_SCALES = 0.5
@@ -48,8 +48,7 @@ class ScaledHogDescriptor:
             found,
             self._described,
             self.length,
-            differences,
-            None if self.upright else oriented,
+            self.upright,
         )
 
     def _described(self, fields: Gradient, points: Keypoints) -> FloatImage:

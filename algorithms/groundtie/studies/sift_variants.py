@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from ..features.descriptors import LENGTH, sift_rows
 from ..features.detectors import SiftDetector, SiftOctDetector
 from ..features.keypoints import Keypoints
-from ..features.scale_space import describe_at_scales
 from ..rasters.patch import Patch, is_logarithmic
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
 from .gradients import DECAY, GRADIENTS, gradient_operator, needs_positive
-from .orientation import oriented
+from .orientation import describe_at_scales
 
 # Least contrast of the comparison of detectors. Without speckle's octave keypoints are weaker, and
 # inliers among them.
@@ -76,5 +75,5 @@ class SiftVariantDescriptor:
         self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
     ) -> tuple[Keypoints, FloatImage]:
         """Describe keypoints of an image whose grey values are taken as they are."""
-        operator, orient = gradient_operator(self.gradient), None if self.upright else oriented
-        return describe_at_scales(image, valid, found, sift_rows, LENGTH, operator, orient)
+        operator = gradient_operator(self.gradient)
+        return describe_at_scales(image, valid, found, sift_rows, LENGTH, self.upright, operator)
