@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray
 from .classifier import DEGREE, OFFSET, FeatureClassifier
 
@@ -22,7 +23,7 @@ _BLOCKS, _FOLDS = 6, 3
 
 
 @dataclass(frozen=True)
-class Training:
+class Training(Rows):
     """Labelled points of an image.
 
     Parameters
@@ -41,20 +42,6 @@ class Training:
     kept: NDArray[np.bool_]
     px: FloatArray
     bands: int = 0
-
-    @classmethod
-    def concatenate(cls, parts: list[Training], bands: int) -> Training:
-        """Return the points of all parts."""
-        return cls(
-            np.concatenate([part.statistics for part in parts]),
-            np.concatenate([part.kept for part in parts]),
-            np.concatenate([part.px for part in parts]),
-            bands,
-        )
-
-    def take(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Training:
-        """Return the points that the mask or index `which` selects."""
-        return Training(self.statistics[which], self.kept[which], self.px[which], self.bands)
 
 
 def train_classifier(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray
 
 
 @dataclass(frozen=True)
-class Keypoints:
+class Keypoints(Rows):
     """A table of keypoints, one row a keypoint.
 
     Parameters
@@ -39,24 +39,9 @@ class Keypoints:
         nothing = np.zeros(0)
         return cls(np.zeros((0, 2)), nothing, nothing, nothing)
 
-    def __len__(self) -> int:
-        return len(self.position_px)
-
-    def take(self, which: Any) -> Keypoints:
-        """Return the rows that the index or mask `which` selects."""
-        return Keypoints(**{name: getattr(self, name)[which] for name in _FIELDS})
-
     def strongest(self, count: int) -> Keypoints:
         """Return at most so many keypoints: those with the largest response, in their order."""
         if len(self) <= count:
             return self
         # Among equals the first are kept.
         return self.take(np.sort(np.argsort(-self.response, kind="stable")[:count]))
-
-    @classmethod
-    def concatenate(cls, tables: list[Keypoints]) -> Keypoints:
-        """Return the rows of all tables, one after the other."""
-        return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _FIELDS})
-
-
-_FIELDS = tuple(Keypoints.__dataclass_fields__)

@@ -226,6 +226,6 @@ def labelled_points(
         px, label = px[label != UNKNOWN], label[label != UNKNOWN]
         bands = image.bands_onto(piece, grid.map_to_pixel) if looked_at else NO_BANDS
         values = patch_statistics(statistics, patch, px, bands)
-        return Training(values, label == KEPT, px + np.subtract(tile[:2], MARGIN_PX))
+        return Training(values, label == KEPT, px + np.subtract(tile[:2], MARGIN_PX), looked_at)
 
-    return Training.concatenate(list(context.map(look, list(tiles(grid)))), looked_at)
+    return Training.concatenate(list(context.map(look, list(tiles(grid)))))

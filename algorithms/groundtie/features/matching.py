@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray
 
 Descriptors = NDArray[np.float32]
@@ -20,7 +21,7 @@ _BLOCK = 4_000_000
 
 
 @dataclass(frozen=True)
-class Matches:
+class Matches(Rows):
     """Keypoints of a first table and their partners in a second one.
 
     Parameters
@@ -35,13 +36,6 @@ class Matches:
     first: Indices
     second: Indices
     ratio: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.first)
-
-    def take(self, which: NDArray[np.bool_]) -> Matches:
-        """Return the matches that the mask `which` selects."""
-        return Matches(self.first[which], self.second[which], self.ratio[which])
 
     @classmethod
     def of(cls, nearest: Nearest) -> Matches:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..rasters.grid import FloatArray, Grid, near_longitude
+from .rows import Rows
 from .transform import Transform
 
 USED = "used"
@@ -20,7 +21,7 @@ NONE_HELD_OUT = (
 
 
 @dataclass(frozen=True)
-class TiePoints:
+class TiePoints(Rows):
     """A table of tie points, one row a point.
 
     Parameters
@@ -57,9 +58,6 @@ class TiePoints:
     crs: CRS | None = None
     more: dict[str, FloatArray] = field(default_factory=dict)
     states_fit: bool = False
-
-    def __len__(self) -> int:
-        return len(self.reference_xy)
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -123,9 +121,8 @@ class TiePoints:
 
     def take(self, which: Any) -> TiePoints:
         """Return the rows that the index or mask `which` selects."""
-        columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         more = {name: values[which] for name, values in self.more.items()}
-        return replace(self, **columns, more=more)
+        return replace(super().take(which), more=more)
 
     @classmethod
     def unmeasured(
@@ -155,14 +152,8 @@ class TiePoints:
         return cls.unmeasured(np.zeros((0, 2)), np.zeros((0, 2)), None)
 
     @classmethod
-    def concatenate(cls, tables: list[TiePoints]) -> TiePoints:
+    def concatenate(cls, tables: Sequence[TiePoints]) -> TiePoints:
         """Return the rows of all tables, which have one map and the same further columns."""
-        first = tables[0]
-        columns: dict[str, Any] = {
-            name: np.concatenate([getattr(t, name) for t in tables]) for name in _COLUMNS
-        }
-        more = {name: np.concatenate([t.more[name] for t in tables]) for name in first.more}
-        return replace(first, **columns, more=more)
-
-
-_COLUMNS = tuple(TiePoints.__dataclass_fields__)[:-3]
+        names = tables[0].more
+        more = {name: np.concatenate([t.more[name] for t in tables]) for name in names}
+        return replace(super().concatenate(tables), more=more)

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray, Grid, mesh
 from ..similarity.peak import find_peak
 from ..similarity.surface import normalise
@@ -62,7 +63,7 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Correspondences:
+class Correspondences(Rows):
     """Places of the reference and where they match in the input, as a model resampled it.
 
     Parameters
@@ -81,12 +82,6 @@ class Correspondences:
     partner_px: FloatArray
     score: FloatArray
     window_area_px2: float
-
-    def take(self, which: NDArray[np.int_] | NDArray[np.bool_]) -> Correspondences:
-        """Return the rows that the index or mask `which` selects."""
-        return Correspondences(
-            self.px[which], self.partner_px[which], self.score[which], self.window_area_px2
-        )
 
 
 @dataclass(frozen=True)
