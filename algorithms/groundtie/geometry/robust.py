@@ -21,6 +21,10 @@ _SAMPLES = 600
 # pairs of features.
 _TOGETHER = 1_000_000
 
+# Pairs agree with a first model of degree 1 within this, in pixels; what bends further is left to
+# the fit that starts from it.
+CONSENSUS_PX = 3.0
+
 # After so many steps a mixture changes no more: between 10 and 300 points by less than 1e-13.
 _MIXTURE_STEPS = 40
 

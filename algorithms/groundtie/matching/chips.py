@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.models import DEGREE, Model
-from ..geometry.robust import find_consensus
+from ..geometry.robust import CONSENSUS_PX, find_consensus
 from ..rasters.grid import FloatArray, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
@@ -44,10 +44,6 @@ _LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
 
 # The background alone reaches about this many robust standard deviations.
 _LEAST_HEIGHT = 3.0
-
-# Chips agree with a first model of degree 1 within this, in pixels; local distortion beyond it is
-# left to the alignment.
-_CONSENSUS_PX = 3.0
 
 # If a tenth of the chips is expected to be shifted by more than this, they are matched again.
 _FAR_PX = 2.5
@@ -124,7 +120,7 @@ class ChipMatcher:
         reach = NEIGHBOUR_SPACINGS * layout.spacing_px
         supported = propagate(surfaces.combined, surfaces.centres, reach)
         first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        return find_consensus(px, px + peak_shifts(supported), _CONSENSUS_PX, first_kind, seed)
+        return find_consensus(px, px + peak_shifts(supported), CONSENSUS_PX, first_kind, seed)
 
     def kind_of(self, kind: str) -> str:
         """Return the kind of model that is fitted where one is asked for."""

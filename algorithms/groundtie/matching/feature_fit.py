@@ -18,7 +18,7 @@ from ..geometry.model_choice import (
     left_out_scores,
 )
 from ..geometry.models import PARAMETERS, Model
-from ..geometry.robust import Mixture, distances, find_consensus, fit_robustly
+from ..geometry.robust import CONSENSUS_PX, Mixture, distances, find_consensus, fit_robustly
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray, apply_affine
 from .matcher import Correspondences
@@ -26,9 +26,6 @@ from .matcher import Correspondences
 # What "auto" chooses from. What bends between radar images of other incidence angles are mostly
 # forests and cities, by their relief displacement, and not the ground.
 _KINDS = ("translation", "similarity", "affine")
-
-# Matches agree with a first model of degree 1, or with a rival, within this.
-_CONSENSUS_PX = 3.0
 
 # Matches further off than this are outliers whatever the model, in pixels.
 _FAR_PX = 3.0
@@ -84,7 +81,7 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
         raise TooFewPointsError(f"only {len(px)} features were matched")
     # Where most are outliers, samples of two matches are without one far more often than those of
     # three; the prior has taken out what a similarity lacks.
-    residual = find_consensus(px, matches.partner_px, _CONSENSUS_PX, first_kind(kind), seed)
+    residual = find_consensus(px, matches.partner_px, CONSENSUS_PX, first_kind(kind), seed)
     start = fit_model("affine", px, apply_affine(prior, residual(px)))
     nominal_px = apply_affine(prior, matches.partner_px)
     if kind == AUTO:
@@ -122,21 +119,21 @@ def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> N
     """
     residual = apply_affine(prior, matches.partner_px) - model(matches.px)
     length = np.hypot(*residual.T)
-    far = length > _FAR_PX + _CONSENSUS_PX
+    far = length > _FAR_PX + CONSENSUS_PX
     if far.sum() < _FEWEST_RIVALS:
         return
     at, residual = matches.px[far], residual[far]
-    rival = find_consensus(at, at + residual, _CONSENSUS_PX, "translation")
+    rival = find_consensus(at, at + residual, CONSENSUS_PX, "translation")
     shift = rival([[0.0, 0.0]])[0]
 
     def agreeing(on: FloatArray) -> int:
-        return int((np.hypot(*(residual - on).T) <= _CONSENSUS_PX).sum())
+        return int((np.hypot(*(residual - on).T) <= CONSENSUS_PX).sum())
 
     others = agreeing(shift)
     # Along roads and between crowns matches slip to both sides alike; elevated objects are
     # displaced to one.
     displaced = others - agreeing(-shift)
-    probability = np.pi * _CONSENSUS_PX**2 / matches.window_area_px2
+    probability = np.pi * CONSENSUS_PX**2 / matches.window_area_px2
     alarms = log10_false_alarms(others, len(at), probability, 1)
     if alarms < _RIVAL_ALARMS and displaced >= _RIVAL_SHARE * (length <= _FAR_PX).sum():
         apart = float(np.hypot(*shift))

@@ -14,7 +14,7 @@ from ..geometry.model_choice import (
     choose_simplest,
     left_out_blocks,
 )
-from ..geometry.robust import densities, find_consensus, fit_mixture
+from ..geometry.robust import CONSENSUS_PX, densities, find_consensus, fit_mixture
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray
 from .bias import KINDS, SHIFT, TERMS, Bias, design
@@ -27,9 +27,6 @@ _STEPS = 30
 
 # No image is measured better than this.
 SMALLEST_SIGMA_PX = 1e-3
-
-# Points agree with a first model within this, in pixels.
-_CONSENSUS_PX = 3.0
 
 # Blunders lie anywhere within this distance at least, in pixels.
 LEAST_REACH_PX = 50
@@ -183,7 +180,7 @@ def _adjust(control: Control, kind: str) -> Adjustment:
 def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
     """Return which points are more probably inliers than blunders, and the spread of these."""
     first = "translation" if kind == SHIFT else "affine"
-    start = find_consensus(control.expected_px, control.found_px, _CONSENSUS_PX, first)
+    start = find_consensus(control.expected_px, control.found_px, CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
     reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
