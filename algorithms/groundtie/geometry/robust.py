@@ -219,7 +219,7 @@ def _sampled_models(
     uv: FloatArray, displacement: FloatArray, kind: str, random: np.random.Generator
 ) -> FloatArray:
     """Return coefficients of degree 1, shape (m, 3, 2), each exact on a random minimal sample."""
-    size = {"translation": 1, "rigid": 2, "similarity": 2, "affine": 3}[kind]
+    size = fewest_points(kind)
     picks = np.empty((_SAMPLES, size), np.intp)
     for some in _parts(_SAMPLES, len(uv)):
         # Numbers are drawn row by row: the same, however many together.

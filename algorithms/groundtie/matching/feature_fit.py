@@ -21,11 +21,8 @@ from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import CONSENSUS_PX, Mixture, distances, find_consensus, fit_robustly
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray, apply_affine
+from .alignment import LINEAR_CANDIDATES
 from .matcher import Correspondences
-
-# What "auto" chooses from. What bends between radar images of other incidence angles are mostly
-# forests and cities, by their relief displacement, and not the ground.
-_KINDS = ("translation", "similarity", "affine")
 
 # Matches further off than this are outliers whatever the model, in pixels.
 _FAR_PX = 3.0
@@ -162,4 +159,6 @@ def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: f
             raise TooFewPointsError(f"only {agreeing} of {len(px)} features agree with a model")
         return kind, -(np.minimum(distance, _FAR_PX) ** 2)
 
-    return choose_simplest(_KINDS, fit, px, np.full(len(px), -(_FAR_PX**2)))[0]
+    # What bends between radar images of other incidence angles are mostly forests and cities, by
+    # their relief displacement, and not the ground.
+    return choose_simplest(LINEAR_CANDIDATES, fit, px, np.full(len(px), -(_FAR_PX**2)))[0]

@@ -9,11 +9,11 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.chance import agreement_probability, log10_false_alarms
-from ..geometry.models import PARAMETERS, Model
+from ..geometry.models import PARAMETERS, Model, fewest_points
 from ..geometry.robust import distances, find_consensus
 from ..rasters.grid import Grid
 from ..similarity.peak import peak_shifts
-from .alignment import IDENTITY, align
+from .alignment import IDENTITY, LINEAR_CANDIDATES, align
 from .belief_propagation import propagate
 from .chips import ChipMatcher
 from .frames import compose
@@ -27,10 +27,6 @@ _CHIP_RANGE_PX = (48, 80)
 
 # Side of the chips with a joint histogram in common.
 _POOLED_CHIP_PX = 64
-
-# Simple models are preferred unless the data favour others: each has its number of
-# hypotheses counted against it.
-_SAMPLE_OF = {"translation": 1, "similarity": 2, "affine": 3}
 
 
 @dataclass(frozen=True)
@@ -77,11 +73,13 @@ def fit_level(
     best = CoarseModel(model, np.inf)
     probability = agreement_probability(_TOLERANCE_PX, radius_px)
     found = px + peak_shifts(supported)
-    for kind, sample in _SAMPLE_OF.items():
+    # Simple models are preferred unless the data favour others: each has its number of hypotheses
+    # counted against it.
+    for kind in LINEAR_CANDIDATES:
         fitted = find_consensus(px, found, _TOLERANCE_PX, kind)
         # Peaks after belief propagation are not independent; only the chips' own are counted.
         agreeing = int((distances(fitted, px, px + own) < _TOLERANCE_PX).sum())
-        alarms = log10_false_alarms(agreeing, len(px), probability, sample)
+        alarms = log10_false_alarms(agreeing, len(px), probability, fewest_points(kind))
         if alarms < best.log10_false_alarms:
             best = CoarseModel(compose(model, fitted, level), alarms)
     return best
