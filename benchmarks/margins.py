@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
-from groundtie.matching.parts import LEAST_EXCESS
+from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
 from groundtie.registration.evidence import RegistrationEvidence
@@ -61,8 +61,9 @@ class Statistic:
 
 
 def _excess(survey: Survey) -> float:
-    part = survey.highest_part
-    return math.nan if part is None else part.excess
+    """Return the excess of the most evident part, evident or not; NaN: there are too few chips."""
+    parts = find_parts(survey.grid, survey.centres, survey.surfaces, -math.inf)
+    return next((part.excess for part in parts), math.nan)
 
 
 def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:

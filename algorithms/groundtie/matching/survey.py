@@ -142,11 +142,6 @@ class Survey:
         """Chips that together match elsewhere, the most evident first."""
         return list(find_parts(self.grid, self.centres, self.surfaces))
 
-    @property
-    def highest_part(self) -> Part | None:
-        """The most evident part, evident or not; None: there are too few chips."""
-        return next(find_parts(self.grid, self.centres, self.surfaces, -np.inf), None)
-
 
 def survey_places(grid: Grid) -> Places:
     """Return chips all over a grid, side by side, or farther apart where it is large."""
