@@ -6,6 +6,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +44,11 @@ def time_points(settings: Settings, times: int, orthority: Path | None) -> list[
     ground = rpc.localise(px, height)
     rounds = 2 * times + 1
     found = [
-        (FORWARD, OWN, _best(lambda: rpc.project(ground, height, THREADS), rounds), ""),
+        (FORWARD, OWN, _best(lambda: _in_threads(rpc.project, ground, height), rounds), ""),
         (
             INVERSE,
             OWN,
-            _best(lambda: rpc.localise(px, height, THREADS), rounds),
+            _best(lambda: _in_threads(rpc.localise, px, height), rounds),
             _miss(rpc, px, height),
         ),
     ]
@@ -69,6 +70,12 @@ def time_points(settings: Settings, times: int, orthority: Path | None) -> list[
     if orthority is not None:
         found += _orthority_points(orthority, rpc, ground, height, px)
     return found
+
+
+def _in_threads(work: Callable[..., FloatArray], *points: FloatArray) -> list[FloatArray]:
+    """Work on as many parts of some points at a time as there are threads, as tiles are worked."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(work, *(np.array_split(part, THREADS) for part in points)))
 
 
 def _best(work: Callable[[], object], times: int) -> float:

@@ -1,14 +1,12 @@
 """Polynomials of positions, evaluated block by block so that all intermediates stay in cache.
 
 The terms of a block form a matrix; one product with the coefficients gives all polynomials.
-numpy releases the interpreter's lock for both, so that blocks can be worked side by side.
+numpy releases the interpreter's lock for both, so that threads can do so side by side.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -76,9 +74,7 @@ def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
     return lower
 
 
-def in_blocks(
-    work: Callable[[slice, FloatArray], None], count: int, workers: int = 1, terms: int = TERMS
-) -> None:
+def in_blocks(work: Callable[[slice, FloatArray], None], count: int, terms: int = TERMS) -> None:
     """Call `work` for all blocks of `count` points, with a matrix for the terms of each.
 
     Parameters
@@ -87,24 +83,10 @@ def in_blocks(
         Takes the points' range and a matrix, (terms, points), that it may overwrite.
     count
         Number of points.
-    workers
-        Number of threads; each works on a run of neighbouring blocks.
     terms
         Rows of the matrix.
     """
-
-    def run(first: int, stop: int) -> None:
-        matrix = np.empty((terms, min(BLOCK, stop - first)))
-        for start in range(first, stop, BLOCK):
-            end = min(start + BLOCK, stop)
-            work(slice(start, end), matrix[:, : end - start])
-
-    workers = min(workers, -(-count // BLOCK))
-    if workers <= 1:
-        if count:
-            run(0, count)
-        return
-    edges = np.linspace(0, count, workers + 1).astype(int).tolist()
-    with ThreadPoolExecutor(workers) as pool:
-        for done in [pool.submit(run, *part) for part in itertools.pairwise(edges)]:
-            done.result()
+    matrix = np.empty((terms, min(BLOCK, count)))
+    for start in range(0, count, BLOCK):
+        stop = min(start + BLOCK, count)
+        work(slice(start, stop), matrix[:, : stop - start])

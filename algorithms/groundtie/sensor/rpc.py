@@ -87,7 +87,7 @@ class RPC:
         by_lon, by_lat, by_height = (derivative(self._coefficients, axis) for axis in range(3))
         return by_lon, by_lat, by_height
 
-    def project(self, lon_lat: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+    def project(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions.
 
         Parameters
@@ -96,8 +96,6 @@ class RPC:
             Longitude and latitude in degrees (WGS 84), shape (n, 2).
         height_m
             Height above the ellipsoid, shape (n,) or one for all.
-        workers
-            Number of threads.
         """
         lon_lat = np.asarray(lon_lat, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
@@ -111,7 +109,7 @@ class RPC:
                 ratio = values[:2] / values[2:]
             px[part] = ratio.T * self.image_scale + self.image_offset
 
-        in_blocks(work, len(px), workers)
+        in_blocks(work, len(px))
         return px
 
     def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
@@ -134,7 +132,7 @@ class RPC:
         in_blocks(work, len(slopes))
         return slopes
 
-    def localise(self, px: ArrayLike, height_m: ArrayLike, workers: int = 1) -> FloatArray:
+    def localise(self, px: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return longitude and latitude, shape (n, 2), of image positions at given heights.
 
         By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it finds nothing.
@@ -143,8 +141,8 @@ class RPC:
         ----------
         px
             Image positions (col, row), shape (n, 2).
-        height_m, workers
-            As `project` has them.
+        height_m
+            As `project` has it.
         """
         px = np.asarray(px, float)
         height = np.broadcast_to(np.asarray(height_m, float), len(px))
@@ -160,7 +158,7 @@ class RPC:
                 self._newton(lph, target, terms)
             found[part] = lph[:2].T * self.scale[:2] + self.offset[:2]
 
-        in_blocks(work, len(px), workers)
+        in_blocks(work, len(px))
         return found
 
     @property
