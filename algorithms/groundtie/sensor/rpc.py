@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..rasters.grid import FloatArray
+from ..rasters.grid import LON_LAT, FloatArray, near_longitude
 from .polynomials import TERMS, derivative, fill_terms, in_blocks
 
 # The inverse has arrived when it misses the image position by less, in pixels.
@@ -190,8 +190,7 @@ class RPC:
             np.subtract(values, self.offset[axis], out=lph[axis])
         # Across the antimeridian longitudes begin anew.
         if (np.abs(lph[0]) > _HALF_TURN_DEG).any():
-            with np.errstate(invalid="ignore"):
-                lph[0] -= 2 * _HALF_TURN_DEG * np.rint(lph[0] / (2 * _HALF_TURN_DEG))
+            lph[:2] = near_longitude(lph[:2].T, 0.0, LON_LAT).T
         lph *= 1 / np.array(self.scale)[:, None]
         return lph
 
