@@ -15,6 +15,7 @@ from .grid import POSITION_ERROR_PX, FloatArray, PointFunction, finite
 from .height_units import in_metres
 from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
+from .warping import are_inside, lies_inside
 
 # Pixels of the raster that are read at a time, a side.
 _BLOCK = 1024
@@ -127,28 +128,20 @@ class SurfacePiece:
 
     image: FloatImage
     corner: FloatArray
-    margin_px: float = _HALF_PX
+    margin_px: float
 
     def at(self, place: NDArray[Any]) -> FloatImage:
         """Return the values at columns and rows of the piece, shape (2, …); NaN beyond it."""
-        (cols, rows), (height, width) = place, self.image.shape
-        inside = (
-            cols.min() >= 0
-            and rows.min() >= 0
-            and cols.max() <= width - 1
-            and rows.max() <= height - 1
-        )
         px = place.reshape(2, -1, place.shape[-1])
-        if inside:
-            return interpolate(self.image, px, "bilinear").reshape(cols.shape)
+        if are_inside(px, self.image.shape, 0):
+            return interpolate(self.image, px, "bilinear").reshape(place.shape[1:])
+        height, width = self.image.shape
         # So that NaN is outside, too.
-        margin = self.margin_px
-        on_it = (px[0] >= -margin) & (px[0] <= width - 1 + margin)
-        on_it &= (px[1] >= -margin) & (px[1] <= height - 1 + margin)
+        on_it = lies_inside(px, width, height, -self.margin_px)
         last = np.array([width, height])[:, None, None] - 1
         values = interpolate(self.image, np.where(on_it, np.clip(px, 0, last), 0), "bilinear")
         values[~on_it] = np.nan
-        return values.reshape(cols.shape)
+        return values.reshape(place.shape[1:])
 
 
 def _parts(px: FloatArray) -> list[NDArray[np.int_]]:

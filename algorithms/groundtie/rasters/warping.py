@@ -78,7 +78,7 @@ def _resample(
     image: NDArray[Any], valid: Mask, px: NDArray[Any], method: str, dtype: np.dtype[Any]
 ) -> tuple[NDArray[Any], Mask]:
     """Return `resample` of an image, whose bands are valid at the same pixels."""
-    if method != "nearest" and valid.all() and _are_inside(px, valid.shape, REACH[method]):
+    if method != "nearest" and valid.all() and are_inside(px, valid.shape, REACH[method]):
         values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
         return rounded(values, dtype), np.ones(px.shape[1:], bool)
     nearest = np.rint(px)
@@ -101,23 +101,24 @@ def _resample(
 def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
     """Return which pixels, columns and rows in `nearest`, are valid, and which are all around."""
     height, width = valid.shape
-    inside = _lies_inside(nearest, width, height, 0)
+    inside = lies_inside(nearest, width, height, 0)
     if valid.all():
-        return inside, _lies_inside(nearest, width, height, reach)
+        return inside, lies_inside(nearest, width, height, reach)
     cols, rows = np.where(inside, nearest, 0).astype(np.intp)
     side = np.ones((2 * reach + 1,) * 2, np.uint8)
     whole = cv2.erode(valid.astype(np.uint8), side, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return inside & valid[rows, cols], inside & (whole[rows, cols] != 0)
 
 
-def _lies_inside(px: NDArray[Any], width: int, height: int, margin: int) -> Mask:
+def lies_inside(px: NDArray[Any], width: int, height: int, margin: float) -> Mask:
+    """Return which positions, (2, m, n), lie in an image, so far from its outer pixels' centres."""
     cols, rows = px
     inside: Mask = (cols >= margin) & (cols <= width - 1 - margin)
     return inside & (rows >= margin) & (rows <= height - 1 - margin)
 
 
-def _are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
-    """Return whether all positions, shape (2, m, n), lie in an image, so far from its borders."""
+def are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
+    """Return whether there are positions, (2, m, n), and all lie so in an image of (h, w)."""
     return all(
         axis.size and axis.min() >= margin and axis.max() <= side - 1 - margin
         for axis, side in zip(px, shape[::-1], strict=True)
