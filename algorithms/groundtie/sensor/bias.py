@@ -14,16 +14,13 @@ from numpy.typing import ArrayLike
 
 from ..geometry.models import monomials
 from ..rasters.grid import FloatArray
-from .rpc import RPC, ground_lattice
-from .rpc_fit import RPCFit, fit_rpc
+from .rpc import RPC, image_lattice
+from .rpc_fit import HEIGHTS, RPCFit, fit_rpc
 
 # Terms of each model, an axis, from the simplest to the most flexible.
 SHIFT = "shift"
 TERMS = {SHIFT: 1, "shift_drift": 2, "affine": 3}
 KINDS = tuple(TERMS)
-
-# Heights, over the range of the RPCs, at which they are fitted again: they hold there as before.
-_HEIGHTS = 7
 
 
 @dataclass(frozen=True)
@@ -96,8 +93,8 @@ def fold(rpc: RPC, bias: Bias) -> RPCFit:
     """
     if bias.kind == SHIFT:
         return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0)
-    heights_m = np.linspace(*rpc.height_range_m, _HEIGHTS)
-    lon_lat, height = ground_lattice(rpc, bias.size, heights_m)
+    px, height = image_lattice(bias.size, np.linspace(*rpc.height_range_m, HEIGHTS))
+    lon_lat = rpc.localise(px, height)
     seen = np.isfinite(lon_lat).all(axis=1)
     lon_lat, height = lon_lat[seen], height[seen]
     px = rpc.project(lon_lat, height)

@@ -22,7 +22,7 @@ from ..rasters.grid import (
 )
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .rpc import RPC, ground_lattice
+from .rpc import RPC, image_lattice
 from .smooth_map import smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
@@ -238,7 +238,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    lon_lat, _ = ground_lattice(rpc, size, [height_m], nodes)
+    lon_lat = rpc.localise(*image_lattice(size, [height_m], nodes))
     seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")

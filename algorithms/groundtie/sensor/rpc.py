@@ -227,15 +227,13 @@ class RPC:
         return _Start.of(self)
 
 
-def ground_lattice(
-    rpc: RPC, size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
+def image_lattice(
+    size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ground positions seen all over an image at several heights.
+    """Return positions all over an image, each at several heights: what `localise` takes.
 
     Parameters
     ----------
-    rpc
-        The image's model.
     size
         Width and height of the image in pixels; the lattice reaches to its corners.
     heights_m
@@ -245,12 +243,12 @@ def ground_lattice(
 
     Returns
     -------
-    lon_lat, height_m
+    px, height_m
         Shapes (n, 2) and (n,).
     """
     axes = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
     cols, rows, heights = (x.ravel() for x in np.meshgrid(*axes, np.asarray(heights_m, float)))
-    return rpc.localise(np.column_stack([cols, rows]), heights), heights
+    return np.column_stack([cols, rows]), heights
 
 
 @dataclass(frozen=True)

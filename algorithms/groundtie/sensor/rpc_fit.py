@@ -20,6 +20,9 @@ _UNKNOWNS = 2 * TERMS - 1
 # one, leaves many of them open. Of the size of an exact fit's rounding errors.
 _RIDGE = 1e-9
 
+# Heights, over the range that RPCs are to hold for, of the lattice that they are fitted to.
+HEIGHTS = 7
+
 # The denominator weighs the residuals; it is known better after each fit.
 _FITS = 4
 
@@ -42,7 +45,7 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     ----------
     lon_lat
         Longitude and latitude in degrees, shape (n, 2); usually a lattice over the scene at
-        several heights (see `rpc.ground_lattice`).
+        several heights (see `rpc.image_lattice`).
     height_m
         Height above the ellipsoid, shape (n,).
     px

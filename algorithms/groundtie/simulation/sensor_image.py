@@ -12,7 +12,8 @@ from scipy.ndimage import map_coordinates
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, mesh, reproject
-from ..sensor.rpc_fit import RPCFit, fit_rpc
+from ..sensor.rpc import image_lattice
+from ..sensor.rpc_fit import HEIGHTS, RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
 from .check_points import InputImage, RoofPoints, ground_points, roof_points
@@ -27,10 +28,8 @@ from .scene import SceneOptions, generate_scenes
 # Height above the ellipsoid that the scene's terrain counts from.
 GROUND_M = 450.0
 
-# Heights that RPCs hold for, beyond those of the terrain, and the lattice that they are fitted to.
+# Heights that RPCs hold for, beyond those of the terrain.
 _RPC_REACH_M = 200.0
-_RPC_NODES = 21
-_RPC_HEIGHTS = 7
 
 _PRECISION_M = 1e-5
 _STEPS = 100
@@ -244,15 +243,9 @@ def _rpcs(
     options: SensorOptions, camera: PushBroom, error: AttitudeError, grid: Grid
 ) -> tuple[RPCFit, RPCFit]:
     """Return the RPCs of the camera, and those with the error, over the image's own range."""
-    width, height = options.scene.size_px
     reach_m = options.hills_m + _RPC_REACH_M
-    axes = (
-        np.linspace(-0.5, width - 0.5, _RPC_NODES),
-        np.linspace(-0.5, height - 0.5, _RPC_NODES),
-        np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, _RPC_HEIGHTS),
-    )
-    columns, rows, heights = (part.ravel() for part in np.meshgrid(*axes))
-    nominal = np.column_stack([columns, rows])
+    heights_m = np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, HEIGHTS)
+    nominal, heights = image_lattice(options.scene.size_px, heights_m)
 
     def fitted(px: FloatArray) -> RPCFit:
         lon_lat = reproject(camera.localise(px, heights), grid.crs, LON_LAT)
