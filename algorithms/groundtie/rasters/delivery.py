@@ -20,15 +20,7 @@ from .reading import RasterSource
 from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import read_around, reduction, resample
 from .windows import Mask, Window
-from .writing import (
-    chosen_nodata,
-    create_like,
-    different_masks,
-    fill_value,
-    keep_apart,
-    require_fit,
-    shared_nodata,
-)
+from .writing import chosen_nodata, create_like, different_masks, put_nodata, shared_nodata
 
 # Share of the work that is left when all pixels are written: overviews.
 _OVERVIEWS = 0.1
@@ -62,8 +54,6 @@ class _Warp:
     ) -> _Warp:
         method = "nearest" if source.colormap else resampling
         nodata = chosen_nodata(source)
-        if nodata is not None:
-            require_fit(nodata, source.dtype)
         size = source.grid.size
         factor = (1, 1) if method == "nearest" else reduction(target, to_input_px, size)
         return cls(source, to_input_px, target, method, nodata, factor, band_groups(source))
@@ -122,10 +112,7 @@ class _Warp:
                     images[part], shown[part], px, self.method, self.source.dtype
                 )
         for values, known, band in zip(out, valid, bands, strict=True):
-            fill = fill_value(self.source, self.nodata, band)
-            if self.nodata is not None or band == self.source.alpha_band:
-                keep_apart(values, fill)
-            values[~known] = fill
+            put_nodata(values, known, 0 if band == self.source.alpha_band else self.nodata)
         return out, valid
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import rasterio.shutil
+from numpy.typing import NDArray
 from rasterio.enums import ColorInterp
 from rasterio.io import MemoryFile
 
@@ -28,6 +29,7 @@ from .tiff_directories import BLOCK, base_image
 from .tiff_file import TiledFile, require_space
 from .tiff_overviews import Reduced, before_level
 from .tiling import in_order
+from .windows import Mask
 
 # Metadata that belong to the file, or locate the pixels, of the input only.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
@@ -70,7 +72,7 @@ def create_like(
         The file to write; see `atomic.Outputs.stage`. One whose final name ends in `.cog.tif`
         becomes a Cloud Optimized GeoTIFF: its blocks are copied once more.
     nodata
-        Value of pixels without data, or None.
+        Value of pixels without data, which their type can hold, or None.
     interleave
         "pixel" or "band"; by default as in the source.
     masked
@@ -89,13 +91,9 @@ def create_like(
 
     Raises
     ------
-    ParameterError
-        The pixel type cannot hold `nodata`.
     OutputError
         The file cannot be written completely.
     """
-    if nodata is not None:
-        require_fit(nodata, source.dtype)
     path = Path(path)
     require_space(path, grid.width * grid.height * source.count * source.dtype.itemsize)
     names = {band.dtype for band in source.bands}
@@ -228,7 +226,8 @@ def shared_nodata(source: RasterSource) -> float | None:
     Raises
     ------
     ParameterError
-        Bands declare different nodata values, or have different masks.
+        Bands declare different nodata values, have different masks, or are of a type that cannot
+        hold the value.
     """
     declared = [source.bands[number - 1].nodata for number in source.image_bands]
     # NaN holds no data, whether or not that is declared.
@@ -240,7 +239,10 @@ def shared_nodata(source: RasterSource) -> float | None:
         )
     if source.has_masks_by_band and len(declared) > 1:
         raise different_masks(source)
-    return next((value for value in declared if value is not None), None)
+    nodata = next((value for value in declared if value is not None), None)
+    if nodata is not None and not fits(nodata, source.dtype):
+        raise ParameterError(f"pixels of type {source.dtype} cannot hold the nodata value {nodata}")
+    return nodata
 
 
 def chosen_nodata(source: RasterSource) -> float | None:
@@ -263,19 +265,15 @@ def different_masks(source: RasterSource) -> ParameterError:
     )
 
 
-def require_fit(nodata: float, dtype: np.dtype[Any]) -> None:
-    """Raise `ParameterError` if pixels of a type cannot hold a nodata value."""
-    if not fits(nodata, dtype):
-        raise ParameterError(f"pixels of type {dtype} cannot hold the nodata value {nodata}")
+def put_nodata(values: NDArray[Any], valid: Mask, nodata: float | None) -> None:
+    """Put the nodata value, 0 if there is none, where pixels are not valid, in place."""
+    fill = values.dtype.type(0 if nodata is None else nodata)
+    if nodata is not None:
+        keep_apart(values, fill)
+    values[~valid] = fill
 
 
-def fill_value(source: RasterSource, nodata: float | None, band: int) -> Any:
-    """Return what stands in a band, numbered from 1, where there is no data."""
-    dtype = source.dtype
-    return dtype.type(0) if nodata is None or band == source.alpha_band else dtype.type(nodata)
-
-
-def keep_apart(values: np.ndarray[Any, Any], fill: Any) -> None:
+def keep_apart(values: NDArray[Any], fill: Any) -> None:
     """Change valid values that GDAL reads as the nodata value, in place, by the least step.
 
     It compares real parts.

@@ -19,7 +19,7 @@ from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, require_workable, tile_count, tiles
-from ..rasters.writing import chosen_nodata, create_like, different_masks, fill_value, keep_apart
+from ..rasters.writing import chosen_nodata, create_like, different_masks, put_nodata
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
 
@@ -107,9 +107,8 @@ class RasterFilter:
         dtype = self.like.dtype
         filtered = rounded(np.multiply(filtered, unit, dtype=working_dtype(dtype)), dtype)
         if self.nodata is not None:
-            fill = fill_value(self.like, self.nodata, band)
-            keep_apart(filtered, fill)
-            return np.where(valid, filtered, fill)
+            put_nodata(filtered, valid, self.nodata)
+            return filtered
         # Beside a mask an invalid pixel keeps its value, a complex one is 0.
         return filtered if source.is_complex else np.where(valid, filtered, values)
 
