@@ -37,6 +37,7 @@ def write_raster(
         "dtype": image.dtype,
         "nodata": nodata,
         "crs": grid.crs,
+        "transform": grid.geotransform,
         "tiled": True,
         "blockxsize": 256,
         "blockysize": 256,
@@ -44,8 +45,6 @@ def write_raster(
         "predictor": 3 if image.dtype.kind == "f" else 2,
         "bigtiff": "if_safer",
     }
-    if grid.geotransform is not None:
-        profile["transform"] = grid.geotransform
     # In memory: a full disk is no exception within GDAL (see `tiff_directories`).
     with MemoryFile() as memory:
         with memory.open(**profile) as raster:

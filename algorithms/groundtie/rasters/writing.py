@@ -137,8 +137,8 @@ def _profile(
 ) -> dict[str, Any]:
     colours = [band.interpretation for band in source.bands]
     rgb = colours[:3] == [ColorInterp.red, ColorInterp.green, ColorInterp.blue]
-    by_band = (interleave or source.interleave or "").lower() == "band"
-    profile = {
+    by_band = (interleave or source.interleave) == "band"
+    return {
         "driver": "GTiff",
         "width": BLOCK,
         "height": BLOCK,
@@ -146,6 +146,7 @@ def _profile(
         "dtype": pixels.name,
         "nodata": nodata,
         "crs": grid.crs,
+        "transform": grid.geotransform,
         "tiled": True,
         "blockxsize": BLOCK,
         "blockysize": BLOCK,
@@ -156,9 +157,6 @@ def _profile(
         "endianness": "LITTLE",
         "sparse_ok": True,
     }
-    if grid.geotransform is not None:
-        profile["transform"] = grid.geotransform
-    return profile
 
 
 def _template(
