@@ -6,14 +6,11 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import rasterio
+from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError
-
-if TYPE_CHECKING:
-    from rasterio.crs import CRS
 
 ELLIPSOIDAL = "ellipsoidal"
 
@@ -46,7 +43,7 @@ def declared_datum(crs: CRS | None) -> str | None:
 def horizontal(crs: CRS) -> CRS:
     """Return a compound CRS without its vertical part; others as they are."""
     found = _COMPOUND.match(crs.to_wkt())
-    return crs if found is None else type(crs).from_wkt(found[1])
+    return crs if found is None else CRS.from_wkt(found[1])
 
 
 def find_geoid(datum: str) -> Path | None:

@@ -47,13 +47,8 @@ _RPB_NAMES = {
     "sampDenCoef": "SAMP_DEN_COEFF",
 }
 
-_UNITS = {
-    "LINE": "pixels",
-    "SAMP": "pixels",
-    "LAT": "degrees",
-    "LONG": "degrees",
-    "HEIGHT": "meters",
-}
+# Of what `_RPC.TXT` does not state in metres.
+_UNITS = {"LINE": "pixels", "SAMP": "pixels", "LAT": "degrees", "LONG": "degrees"}
 
 
 def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> RPC:
