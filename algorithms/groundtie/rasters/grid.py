@@ -222,18 +222,9 @@ class Grid:
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""
         along = np.linspace(0, 1, points_per_side, endpoint=False)
-        corner = np.zeros_like(along)
-        unit = np.concatenate(
-            [
-                np.column_stack(side)
-                for side in (
-                    (along, corner),
-                    (corner + 1, along),
-                    (1 - along, corner + 1),
-                    (corner, 1 - along),
-                )
-            ]
-        )
+        x = np.concatenate([along, np.ones_like(along), 1 - along, np.zeros_like(along)])
+        # Rows are along a side what columns are along the one before.
+        unit = np.column_stack([x, np.roll(x, points_per_side)])
         return np.asarray(unit * self.size - 0.5)
 
     def to_json(self) -> dict[str, Any]:
