@@ -5,7 +5,12 @@ import pytest
 from raster_files import UTM, utm_grid
 
 from groundtie.errors import TooFewPointsError
-from groundtie.geometry.estimation import fit_thin_plate, jackknife_spread
+from groundtie.geometry.estimation import (
+    Estimate,
+    fit_thin_plate,
+    fit_without_blocks,
+    jackknife_spread,
+)
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.model_choice import left_out_blocks
 from groundtie.geometry.models import Frame, Model, PolynomialModel, shift_model
@@ -54,6 +59,22 @@ def test_the_spread_is_how_much_estimates_vary(kind: str) -> None:
         told.append(jackknife_spread(left_out, at) ** 2)
     actual = np.var(predictions, axis=0).sum(axis=1)
     assert np.sqrt(np.mean(told)) == pytest.approx(np.sqrt(actual.mean()), rel=0.25)
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0])
+def test_the_spread_on_a_grid_is_in_its_pixels(scale: float) -> None:
+    """Matching errors are as large on the reference, whatever scale the input is brought to."""
+    px, rng = lattice(), np.random.default_rng(0)
+    matched = px + 0.5 * rng.normal(size=px.shape)
+
+    def spread(scale: float) -> np.ndarray:
+        folds = fit_without_blocks("affine", px, scale * matched, np.ones(len(px)))
+        model = fit_model("affine", px, scale * px).on_map(GRID.transform)
+        points = tie_points(px, scale * matched)
+        estimate = Estimate(Transform(model, UTM, GRID), points, folds)
+        return jackknife_spread(estimate.folds_on(GRID), lattice(5, 4))
+
+    np.testing.assert_allclose(spread(scale), spread(1.0), rtol=1e-6)
 
 
 def test_the_spread_of_a_mean_by_hand() -> None:

@@ -1,10 +1,16 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
+from affine import Affine
 from raster_files import UTM, utm_grid
 
+from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import apply_affine, compose
 
 GRID = utm_grid(100, 100)
 NOMINAL = Transform.nominal(UTM, GRID)
@@ -27,6 +33,21 @@ def some_points(count: int = 5) -> TiePoints:
 def test_residuals_are_what_was_measured_minus_what_is_predicted() -> None:
     # The map position is 10 m east of where the input claims it, so the prediction is 1 px on.
     np.testing.assert_allclose(some_points().residual_px(NOMINAL), [[-1, 0]] * 5, atol=1e-6)
+
+
+@pytest.mark.parametrize(("scale", "angle_deg"), [(0.5, 0), (2, 0), (1, 90), (0.5, 30)])
+def test_residuals_on_a_grid_are_in_its_pixels(scale: float, angle_deg: float) -> None:
+    """Matched 1 px too far right, wherever the input's own pixels lie and however large."""
+    by = compose(Affine.rotation(angle_deg), Affine.scale(scale))
+    px = some_points().input_px
+    model = fit_model("affine", GRID.pixel_to_map(px), GRID.pixel_to_map(apply_affine(by, px)))
+    points = replace(
+        some_points(),
+        reference_xy=GRID.pixel_to_map(px),
+        input_px=apply_affine(by, px + [1, 0]),
+    )
+    found = points.residual_on(GRID, Transform(model, UTM, GRID))
+    np.testing.assert_allclose(found, [[1, 0]] * 5, atol=1e-6)
 
 
 def test_rejecting_keeps_the_first_reason() -> None:

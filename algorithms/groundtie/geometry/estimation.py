@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -35,6 +36,19 @@ class Estimate:
     transform: Transform
     points: TiePoints
     fold_models: tuple[PointFunction, ...]
+
+    def folds_on(self, grid: Grid) -> tuple[PointFunction, ...]:
+        """Return the models of the folds in pixels of the matching grid of the reference.
+
+        But for what is common to all. Nominal pixels, which the transform may scale and rotate,
+        are others.
+        """
+        to_reference = np.asarray(np.linalg.inv(self.transform.linear_on(grid)).T)
+        return tuple(partial(_scaled, fold, to_reference) for fold in self.fold_models)
+
+
+def _scaled(fold: PointFunction, by: FloatArray, px: FloatArray) -> FloatArray:
+    return np.asarray(fold(px) @ by)
 
 
 def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:

@@ -95,9 +95,13 @@ class TiePoints(Rows):
         return np.asarray(self.input_px - transform(self.reference_xy))
 
     def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
-        """Return nominal minus predicted positions in pixels of a grid on the map, (n, 2)."""
+        """Return nominal minus predicted positions in pixels of a grid of the reference, (n, 2).
+
+        Pixels as chips have them, in which the input is scaled and rotated onto the reference.
+        """
         nominal = grid.map_to_pixel(self.nominal_xy(transform))
-        return nominal - grid.map_to_pixel(transform.model(self.reference_xy))
+        missed = nominal - grid.map_to_pixel(transform.model(self.reference_xy))
+        return np.asarray(missed @ np.linalg.inv(transform.linear_on(grid)).T)
 
     def exchanged(self, reference_grid: Grid, input_grid: Grid) -> TiePoints:
         """Return the points, found with the roles of the images exchanged, in their own roles.

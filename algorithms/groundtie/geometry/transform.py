@@ -79,6 +79,17 @@ class Transform:
         xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
         return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
+    def linear_on(self, grid: Grid) -> FloatArray:
+        """Return how many nominal pixels of a grid one of its pixels becomes, (x, y), shape (2, 2).
+
+        From one side of the grid to the other, along columns and along rows; without heights.
+        """
+        model = self.model.affine if isinstance(self.model, TerrainModel) else self.model
+        size = np.array(grid.size, float)
+        ends = (size - 1) / 2 + np.vstack([np.diag(-size), np.diag(size)]) / 2
+        first, last = np.split(grid.map_to_pixel(model(grid.pixel_to_map(ends))), 2)
+        return np.asarray(((last - first) / size[:, None]).T)
+
     def inverse(self, px: ArrayLike) -> FloatArray:
         """Return the reference map positions of input pixels (col, row), (..., 2)."""
         nominal = self.nominal_xy(px)

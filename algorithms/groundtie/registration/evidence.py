@@ -26,7 +26,7 @@ from ..geometry.tie_points import TiePoints
 from ..masks.used import NONE, MaskUsed
 from ..matching.check import CHECK_RADIUS_PX
 from ..matching.surveys import Surveys
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, PointFunction
 from .layover import mean_of_heights_px
 from .scene import SceneInfo
 from .surface_masks import ModelFit
@@ -265,14 +265,13 @@ class RegistrationEvidence:
     def held_out(self) -> Agreement:
         """How the check points agree; those without a peak count as disagreeing."""
         misses, lattice = self._misses, self.grid.lattice()
-        fold_models = self.estimate.fold_models
         return Agreement.of(
             "check points",
             misses,
             len(self.check),
             "the overlap",
-            jackknife_spread(fold_models, lattice),
-            predict_accuracy(fold_models, lattice, misses, self.common),
+            jackknife_spread(self._folds, lattice),
+            predict_accuracy(self._folds, lattice, misses, self.common),
             self.tries,
         )
 
@@ -287,7 +286,11 @@ class RegistrationEvidence:
 
     def standard_deviation_px(self, px: FloatArray) -> FloatArray:
         """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
-        return standard_deviation_px(self.estimate.fold_models, px, self._misses, self.common)
+        return standard_deviation_px(self._folds, px, self._misses, self.common)
+
+    @cached_property
+    def _folds(self) -> tuple[PointFunction, ...]:
+        return self.estimate.folds_on(self.grid)
 
     @cached_property
     def _misses(self) -> Misses:
