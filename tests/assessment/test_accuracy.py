@@ -83,6 +83,22 @@ class TestVerdict:
         verdict = Assessment(test_points=replace(errors, counted=counted)).judge(3.0)
         assert verdict.rule == rule
 
+    @pytest.mark.parametrize("count", [6, 10, 16])
+    def test_test_points_that_fell_anywhere_are_refused(self, count: int) -> None:
+        """By 3 % and more of such draws, three of them scatter no wider than is allowed."""
+        for seed in range(200):
+            far = np.random.default_rng(seed).uniform(-12.5, 12.5, (count, 2))
+            points = self.errors(far, count).of_inliers(3.0)
+            assert not Assessment(test_points=points).judge(3.0).accepted
+
+    @pytest.mark.parametrize("sigma", [0.0, 0.1, 2.0])
+    def test_few_test_points_that_agree_are_enough(self, sigma: float) -> None:
+        points = self.errors(normal_errors(6, sigma), 6).of_inliers(3.0)
+        verdict = Assessment(test_points=points).judge(3.0)
+        assert verdict.accepted
+        assert verdict.log10_chance < -4
+        assert verdict.summary()["chance"] < 1e-4
+
     def test_a_point_that_cannot_be_placed_is_no_small_error(self) -> None:
         errors = self.errors([0.1, 0])
         errors.error_px[3] = np.inf

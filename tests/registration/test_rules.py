@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -108,7 +109,7 @@ def assessed(
     count = len(errors)
     inliers = np.arange(count) < (count if counted is None else counted)
     points = PointErrors(np.zeros((count, 2)), errors, np.ones(count, bool), inliers)
-    return AssessmentEvidence("check points", points, 3.0, misses_px)
+    return AssessmentEvidence("check points", points, 3.0, misses_px, math.nan)
 
 
 def of_nine(agreeing: int) -> Agreement:

@@ -33,21 +33,24 @@ class AssessmentEvidence:
         Largest root mean square error, in input pixels.
     misses_px
         Root mean square inconsistency of the ways back, by name; NaN: not measured.
+    log10_chance
+        log10 of the probability that random points would agree as well; NaN: they are none.
     """
 
     name: str
     points: PointErrors
     max_error_px: float
     misses_px: Mapping[str, float]
+    log10_chance: float
 
     stages: ClassVar = (ASSESSMENT, AGREEMENT, ERROR)
 
     @property
     def held_out(self) -> Agreement:
-        """How the points agree; nothing is known of chance and of the model's spread."""
+        """How the points agree; nothing is known of the model's spread."""
         used, count = int(self.points.used.sum()), len(self.points)
-        rmse = self.points.in_pixels.rmse
-        return Agreement(self.name, used, count, math.nan, rmse, self.max_error_px, 0.0, "")
+        rmse, limit = self.points.in_pixels.rmse, self.max_error_px
+        return Agreement(self.name, used, count, self.log10_chance, rmse, limit, 0.0, "")
 
 
 @dataclass(frozen=True)
@@ -96,15 +99,16 @@ class Assessment:
         TooFewPointsError
             There are neither check points nor test points.
         """
-        name, judged = "check points", self.check_points
+        name, judged, chance = "check points", self.check_points, math.nan
         if not len(judged):
             name, judged = "test points", self.test_points
+            chance = judged.log10_chance
         if not len(judged):
             raise TooFewPointsError(NONE_HELD_OUT)
         px, metres = judged.in_pixels, judged.in_metres
         ways = {"two-way": self.two_way, "three-way": self.three_way}
         misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}
-        evidence = AssessmentEvidence(name, judged, max_error_px, misses)
+        evidence = AssessmentEvidence(name, judged, max_error_px, misses, chance)
         return replace(
             decide(evidence, f"{name} confirm the registration"),
             fit_points=len(self.control_points),
@@ -115,5 +119,5 @@ class Assessment:
             check_rmse_m=metres.rmse,
             check_ce90_px=px.ce90,
             check_ce90_m=metres.ce90,
-            log10_chance=math.nan,
+            log10_chance=chance,
         )

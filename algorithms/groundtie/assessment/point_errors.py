@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..geometry.chance import log10_least_false_alarms
 from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import TiePoints
@@ -131,6 +132,21 @@ class PointErrors:
         """Statistics in metres, along x and y of the reference map."""
         return Statistics.of(np.zeros((0, 2)) if self.error_m is None else self.error_m[self.used])
 
+    @property
+    def window_area_px2(self) -> float:
+        """Area of the windows in which outliers fall anywhere: usual ones, or as errors show."""
+        return max(_WINDOW_AREA_PX2, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
+
+    @property
+    def log10_chance(self) -> float:
+        """log10 of the probability that random matches would agree as well; 0 of none.
+
+        Within whatever radius is the least likely ([Moisan2004]).
+        """
+        if not self.placed.any():
+            return 0.0
+        return min(log10_least_false_alarms(self.length_px, self.window_area_px2, 0), 0.0)
+
     def of_inliers(self, max_error_px: float | None = None) -> PointErrors:
         """Return the errors of which only those of inliers count.
 
@@ -142,7 +158,7 @@ class PointErrors:
         errors = self.error_px[which]
         if len(errors) == 0:
             return self
-        area = max(_WINDOW_AREA_PX2, float(np.ptp(errors, axis=0).prod()))
+        area = self.window_area_px2
         sigmas = sigma_range_px(USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px)
         counted = np.zeros(len(self), bool)
         counted[which] = fit_mixture(errors, area, sigmas).inliers

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp, xlog1py, xlogy
 
+from ..rasters.grid import FloatArray
+
 
 def agreement_probability(tolerance_px: float, radius_px: int) -> float:
     """Return the probability that a random match agrees with a model.
@@ -53,6 +55,30 @@ def log10_false_alarms(agreeing: int, total: int, probability: float, sample: in
     log_subsets = float(_log_binomial(total, np.array(sample)))
     chance = log10_chance(agreeing - sample, total - sample, probability)
     return float(log_subsets / math.log(10) + chance)
+
+
+def log10_least_false_alarms(lengths_px: FloatArray, area_px2: float, sample: int) -> float:
+    """Return that of matches with residuals of some lengths, shape (n,), n > `sample`.
+
+    They agree within whatever radius is the least likely, of all that were tried; those of NaN
+    within none.
+
+    Parameters
+    ----------
+    lengths_px
+        Lengths of the residuals.
+    area_px2
+        Area in which matches by chance fall anywhere.
+    sample
+        See `log10_false_alarms`.
+    """
+    radii = np.nan_to_num(np.sort(lengths_px)[sample:], nan=np.inf)
+    probabilities = np.minimum(math.pi * radii**2 / area_px2, 1.0).tolist()
+    alarms = [
+        log10_false_alarms(agreeing, len(lengths_px), probability, sample)
+        for agreeing, probability in enumerate(probabilities, start=sample + 1)
+    ]
+    return min(alarms) + math.log10(len(alarms))
 
 
 def _log_binomial(total: int, count: NDArray[np.int_]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
-from ..geometry.chance import log10_false_alarms
+from ..geometry.chance import log10_least_false_alarms
 from ..geometry.fitting import fit_model
 from ..geometry.models import DEGREE, Frame, fewest_points, monomials
 from ..geometry.tie_point_files import EDITED
@@ -175,14 +175,8 @@ class TiePointEvidence:
             return None
         sample = fewest_points(self.judged_by)
         residuals = self.residuals_px(self._fitted(self.judged_by))[self.taken]
-        radii = np.nan_to_num(np.sort(residuals)[sample:], nan=np.inf)
         area = self.input_grid.width * self.input_grid.height
-        probabilities = np.minimum(math.pi * radii**2 / area, 1.0).tolist()
-        chances = [
-            log10_false_alarms(agreeing, self.count, probability, sample)
-            for agreeing, probability in enumerate(probabilities, start=sample + 1)
-        ]
-        return min(chances) + math.log10(len(chances))
+        return log10_least_false_alarms(residuals, area, sample)
 
     def fit(self) -> TiePointFit:
         """Return how the transform fits the points."""
