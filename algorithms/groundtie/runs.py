@@ -8,6 +8,7 @@ workers, so that its files are the same, too.
 from __future__ import annotations
 
 import hashlib
+import os
 import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -107,13 +108,19 @@ def run_tags(name: str = RUN) -> dict[str, str]:
     return {} if call is None else {name: call.run}
 
 
+def file_state(path: Path | str) -> tuple[int, int] | None:
+    """Return size in bytes, and time of the last change in nanoseconds; None: there is no file."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns
+
+
 def _facts(value: Any) -> Any:
     if isinstance(value, Path):
-        try:
-            found = value.stat()
-        except OSError:
-            return str(value)
-        return value.name, found.st_size, found.st_mtime_ns
+        state = file_state(value)
+        return str(value) if state is None else (value.name, *state)
     if isinstance(value, tuple):
         return tuple(map(_facts, value))
     if value is None or isinstance(value, (str, int, float)):

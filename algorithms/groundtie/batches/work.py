@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import time
 import traceback
@@ -17,7 +16,7 @@ from ..errors import CancelledError, GroundTieError, NotRegisteredError
 from ..executors import enter_worker, stop_requested
 from ..progress import Progress
 from ..report.page import plain
-from ..runs import running
+from ..runs import file_state, running
 from ..version import __version__
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
@@ -147,8 +146,7 @@ def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:
     """
     found = {}
     for path in paths:
-        with contextlib.suppress(OSError):
-            status = path.stat()
-            facts = (0, 0) if path.is_dir() else (status.st_size, status.st_mtime_ns)
-            found[str(path)] = facts
+        state = (0, 0) if path.is_dir() else file_state(path)
+        if state is not None:
+            found[str(path)] = state
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -29,7 +28,7 @@ from ..rasters.reading import RasterSource, open_raster
 from ..rasters.vrt import sources_of
 from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
-from ..runs import digest
+from ..runs import digest, file_state
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
@@ -239,8 +238,5 @@ def parts_of_layer(layer: Any) -> list[Any]:
 
 def file_facts(path: Path | str | None) -> tuple[Any, ...]:
     """Return name, size and time of the last change of a file; of another, its name."""
-    try:
-        found = os.stat(path) if path is not None else None
-    except OSError:
-        found = None
-    return (str(path),) if found is None else (str(path), found.st_size, found.st_mtime_ns)
+    state = None if path is None else file_state(path)
+    return (str(path), *(state or ()))
