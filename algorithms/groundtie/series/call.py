@@ -218,17 +218,13 @@ def _on_one_map(
     failures = dict(failures)
     if reference in failures:
         raise ParameterError(failures[reference])
-    with_crs = [date.source.grid.crs is not None for date in opened]
-    wanted = 2 * sum(with_crs) >= len(with_crs)
-    for date, has_crs in zip(opened, with_crs, strict=True):
-        if date.name == reference:
-            wanted = has_crs
-    dates = []
-    for date, has_crs in zip(opened, with_crs, strict=True):
-        if has_crs == wanted:
-            dates.append(date)
-        else:
-            failures[date.name] = f"{date.source.path} has {'a' if has_crs else 'no'} CRS"
+    has_crs = {date.name: date.source.grid.crs is not None for date in opened}
+    most = 2 * sum(has_crs.values()) >= len(has_crs)
+    wanted = most if reference is None else has_crs[reference]
+    dates = [date for date in opened if has_crs[date.name] == wanted]
+    for date in opened:
+        if has_crs[date.name] != wanted:
+            failures[date.name] = f"{date.source.path} has {'no' if wanted else 'a'} CRS"
     if len(dates) < 2:
         raise ParameterError("; ".join(failures.values()))
     return dates, failures

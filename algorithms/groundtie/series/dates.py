@@ -50,16 +50,16 @@ class Date:
     source
         The raster, as its file is.
     matched
-        What is matched: the same, or its grey image in memory.
+        What is matched of it: the same, or its grey image in memory.
     band
-        Which band of the file is matched; None: the mean of all.
+        Which band of the file that is; None: the mean of all.
     mask
         Its mask, on its own pixels; None: it has none, or one that each pair makes.
     """
 
     listed: Listed
     source: RasterSource
-    matched: RasterSource
+    matched: Image
     band: int | None
     mask: DateMask | None = None
 
@@ -68,15 +68,9 @@ class Date:
         """What it is called."""
         return self.listed.name
 
-    @property
-    def _matched_band(self) -> int | None:
-        # An image in memory has but the band that is matched.
-        return self.band if self.matched is self.source else None
-
-    def image(self, grid: Grid | None = None) -> Image:
+    def image(self, grid: Grid) -> Image:
         """Return what is matched, as if its pixels lay on another grid of the same size."""
-        matched = self.matched if grid is None else replace(self.matched, grid=grid)
-        return Image(matched, self._matched_band)
+        return replace(self.matched, source=replace(self.matched.source, grid=grid))
 
     def masked(self, image: Image) -> Image:
         """Return its image in a pair with its mask."""
@@ -92,7 +86,7 @@ class Date:
         """Whether its metadata or its speckle are those of a radar image."""
         if is_known_radar(self.source):
             return True
-        return variation2_of(self.image()) >= LEAST_VARIATION2
+        return variation2_of(self.matched) >= LEAST_VARIATION2
 
     @cached_property
     def facts(self) -> tuple[Any, ...]:
@@ -128,11 +122,9 @@ class Date:
     @cached_property
     def rings(self) -> list[FloatArray]:
         """Outlines of its valid pixels on its own map, each of shape (n, 2)."""
-        grid = self.matched.grid
-        small = overview_grid(grid, _FOOTPRINT_PX)
-        _, valid = self.matched.read(
-            self.matched.window, self._matched_band, (small.height, small.width)
-        )
+        source, band = self.matched.source, self.matched.band
+        small = overview_grid(source.grid, _FOOTPRINT_PX)
+        _, valid = source.read(source.window, band, (small.height, small.width))
         found = [
             shape(geometry)
             for geometry, value in shapes(valid.astype(np.uint8), transform=small.transform)
@@ -184,9 +176,10 @@ def open_dates(
             if one.mask is not None and one.mask.is_drawn:
                 mask = draw_mask(source, one.mask, stack, context.quiet().progress)
                 context.update(number / len(listed), mask.note)
-            date = Date(one, source, source, band, mask)
+            matched = Image(source, band)
             if held_bytes <= most_bytes:
-                date = replace(date, matched=held_grey(source, band))
+                matched = Image(held_grey(source, band))  # of the band that is matched alone
+            date = Date(one, source, matched, band, mask)
             date.read(with_footprints)
             dates.append(date)
         except CancelledError:

@@ -82,7 +82,7 @@ class SeriesReport(Page):
         found = []
         for one in dates:
             assert one.date is not None and one.transform is not None
-            image = one.date.image()
+            image = one.date.matched
             nominal = Transform.nominal(one.transform.crs, one.transform.input_grid)
             to_px = [
                 pictures.overview_positions(transform.of_map(grid.crs), grid)
