@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from groundtie.kinds import Choice
-from groundtie.tools import load_tools
+from groundtie.tools import NAMES, load_tools
 from scripts import make_models
 
 PLUGIN = Path(__file__).resolve().parents[1] / "plugin" / "groundtie_qgis"
@@ -47,7 +47,7 @@ def _of_declarations() -> Iterator[str]:
         for parameter in tool.parameters:
             yield from (parameter.kind.label, parameter.kind.help)
             if isinstance(parameter.kind, Choice):
-                yield from map(label_of, parameter.kind.choices)
+                yield from (label_of(word) for word in parameter.kind.choices if word not in NAMES)
 
 
 def plugin_module(name: str) -> ModuleType:

@@ -35,26 +35,6 @@ _LABELS = {
     "sar": "SAR",
     "gamma-map": "Gamma MAP",
     "enhanced-frost": "Enhanced Frost",
-    # Tools, by their titles (a test compares).
-    "register": "Register images",
-    "coregister": "Co-register images",
-    "match_sar_sar": "Match SAR with SAR",
-    "match_optical": "Match optical images",
-    "coregister_series": "Co-register a series",
-    "train_feature_classifier": "Train a feature classifier",
-    "estimate_rotation": "Estimate rotation and scale",
-    "warp": "Warp a raster",
-    "extract_gcps": "Extract ground control",
-    "refine_rpc": "Refine RPCs",
-    "assess": "Assess a registration",
-    "assess_sensor": "Assess RPCs",
-    "detector_repeatability": "Repeatability of detectors",
-    "mask_threshold": "Mask by thresholds",
-    "mask_ground": "Mask by layover and shadow",
-    "mask_regions": "Mask by regions",
-    "mask_surface": "Mask by a surface model",
-    "simulate": "Simulate a SAR–optical pair",
-    "simulate_sensor": "Simulate a sensor image",
 }
 
 

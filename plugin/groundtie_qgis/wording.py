@@ -11,8 +11,9 @@ from .unavailable import named_tools
 
 
 def choice_label(word: str) -> str:
-    """Return what dialogs show for a word of the command line."""
-    return tr(label_of(word))
+    """Return what dialogs show for a word of the command line; for a tool's name its title."""
+    titles = {tool.name: tool.title for tool in named_tools()}
+    return tr(titles.get(word) or label_of(word))
 
 
 def in_words(text: str, tool: Any) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from groundtie.tools import load_tools
 from scripts import translations
 
 GERMAN = translations.PLUGIN / "i18n" / "groundtie_de.ts"
@@ -75,14 +74,6 @@ def test_a_text_that_is_not_translated_is_found() -> None:
 def test_no_module_shows_a_text_untranslated(path: Path) -> None:
     literals = shown_literals(path.read_text(encoding="utf-8"))
     assert [text for text in literals if "<p" not in text] == []
-
-
-def test_labels_of_tools_are_their_titles() -> None:
-    label_of = translations.plugin_module("choice_labels").label_of
-    batch = next(tool for tool in load_tools() if tool.name == "batch")
-    titles = {tool.name: tool.title for tool in load_tools()}
-    for name in batch.parameter("tool").kind.choices:  # type: ignore[attr-defined]
-        assert label_of(name) == titles[name]
 
 
 def test_qt_reads_the_file(tmp_path: Path) -> None:
