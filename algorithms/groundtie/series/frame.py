@@ -20,11 +20,9 @@ PARAMETERS = 6
 # Positions a side of the square at which a move is sampled: a plane needs two, bends average out.
 _LATTICE = 5
 
-# Corners of grids that are the same differ by rounding alone.
-_SAME_PX = 1e-6
-
-# A displacement with less of a linear part, at the frame's border, is a shift.
-SHIFT_PX = 1e-6
+# What differs by less differs by rounding alone: corners of grids, or the linear part of a
+# displacement, at the frame's border, from that of a shift.
+ROUNDING_PX = 1e-6
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ class SeriesFrame:
         factor = self.grid.pixel_size[0] / hub.pixel_size[0]
         made = hub.scaled(max(factor, 1.0))
         corners = self.grid.map_to_pixel(made.pixel_to_map(made.outline(1)))
-        is_there = np.allclose(corners, self.grid.outline(1), rtol=0, atol=_SAME_PX)
+        is_there = np.allclose(corners, self.grid.outline(1), rtol=0, atol=ROUNDING_PX)
         return is_there and (made.crs, made.width) == (self.grid.crs, self.grid.width)
 
     def enter(self, xy: FloatArray) -> FloatArray:
@@ -123,7 +121,7 @@ class SeriesFrame:
             Affine.scale(self.half_px),
         )
         coefficients = displacement.reshape(3, 2) / self.half_px
-        if np.abs(displacement[2:]).max() < SHIFT_PX:
+        if np.abs(displacement[2:]).max() < ROUNDING_PX:
             return PolynomialModel("translation", Frame(square), coefficients[:1])
         return PolynomialModel("affine", Frame(square), coefficients)
 

@@ -19,7 +19,7 @@ from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 
 from ..geometry.judging import SIGNIFICANCE
 from ..rasters.reading import Mask
-from .frame import PARAMETERS, SHIFT_PX, FloatArray, SeriesFrame, sigma_px
+from .frame import PARAMETERS, ROUNDING_PX, FloatArray, SeriesFrame, sigma_px
 
 # How far dates may be from each other.
 _GOAL_PX = 0.3
@@ -63,7 +63,7 @@ class Link:
 
 def degrees_of_freedom(links: Sequence[Link]) -> int:
     """Return how many of a displacement's six numbers links can differ in: two, of shifts alone."""
-    is_shift = all(np.abs(link.displacement[2:]).max() < SHIFT_PX for link in links)
+    is_shift = all(np.abs(link.displacement[2:]).max() < ROUNDING_PX for link in links)
     return 2 if is_shift else PARAMETERS
 
 

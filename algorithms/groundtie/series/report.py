@@ -66,9 +66,7 @@ class SeriesReport(Page):
             "count": len(series.registered) + len(series.left_out),
             "loops": series.loops(),
             "beyond": series.beyond_line(),
-            "rejected": [
-                " – ".join(series.names[k] for k in ends) for ends in series.settled.rejected
-            ],
+            "rejected": [" – ".join(names) for names in series.rejected],
             "shifts": figures.svg_uri(shift_figure(series)) if len(placed) > 1 else None,
             "closures": figures.svg_uri(closure_figure(series))
             if series.loops()["count"]

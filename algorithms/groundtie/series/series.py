@@ -203,7 +203,7 @@ class Series:
             One of `registered_output.OUTPUT_GRIDS`.
         """
         assert date.transform is not None
-        transforms, rejected = self.transforms(), {frozenset(one) for one in self._rejected}
+        transforms, rejected = self.transforms(), {frozenset(one) for one in self.rejected}
         linked = {
             name
             for pair in self.pairs
@@ -231,7 +231,8 @@ class Series:
         )
 
     @property
-    def _rejected(self) -> list[list[str]]:
+    def rejected(self) -> list[list[str]]:
+        """Names of the dates of each registration that contradicts the network."""
         return [[self.names[k] for k in ends] for ends in self.settled.rejected]
 
     def loops(self) -> dict[str, Any]:
@@ -265,7 +266,7 @@ class Series:
             "datum": self.datum,
             "dates": self.rows(),
             "loops": self.loops(),
-            "rejected_pairs": self._rejected,
+            "rejected_pairs": self.rejected,
             "registered_pairs": self.registered_pairs,
             "reused_pairs": self.reused_pairs,
             **made(self.parameters, self.seconds),

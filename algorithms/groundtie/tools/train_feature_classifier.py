@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,13 +43,7 @@ class TrainingResult:
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        return {
-            "output": str(self.output),
-            "kept": self.kept,
-            "left_out": self.left_out,
-            "support_vectors": self.support_vectors,
-            "accuracy": self.accuracy,
-        }
+        return {**asdict(self), "output": str(self.output)}
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
