@@ -14,13 +14,11 @@ from ..geometry.transform import Transform
 from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.delivery import warp_raster
 from ..rasters.grid import Grid, require_both_or_none
 from ..rasters.reading import bounded_cache, open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.vrt import SUFFIX as VRT
-from ..rasters.vrt import write_vrt
-from ..registration.registered_output import moved_grid
+from ..registration.registered_output import REFERENCE_GRID, RegisteredOutput
 from ..registration.stored_transform import TiePointFit, load_stored, transform_of
 from .parameters import general
 from .results import SIZE_OUTPUTS, WrittenRaster
@@ -97,20 +95,11 @@ def warp(
     with bounded_cache(), open_raster(input) as source:
         found, fit = load_stored(transform, model, source)
         found = transform_of(found, source, transform)
-        target = moved_grid(found) if is_vrt else _target_grid(found, reference, pixel_size)
+        # A .vrt has but the pixels of the input.
+        grid = found.input_grid if is_vrt else _target_grid(found, reference, pixel_size)
+        made = RegisteredOutput(output, REFERENCE_GRID, resampling)
         with threads(workers, progress) as context, Outputs() as outputs:
-            if is_vrt:
-                write_vrt(source, target, outputs.stage(output))
-                return WarpResult(output, target, found, fit)
-            warp_raster(
-                source,
-                found.of_map(target.crs),
-                target,
-                outputs.stage(output),
-                resampling,
-                workers=context.workers,
-                progress=progress,
-            )
+            target = made.write(source, grid, found, outputs, context)
     return WarpResult(output, target, found, fit)
 
 
