@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import nullcontext
@@ -21,7 +22,7 @@ from .apart import check_apart
 from .calls import Call, make_calls
 from .log import EventLog, open_log, read_finished, still_there
 from .result import BatchResult, BatchRow
-from .running import Reporter, run_calls
+from .running import progress_line, run_calls
 from .work import FAILED, Outcome
 
 
@@ -140,13 +141,15 @@ class Batch:
             if call.problem:
                 log.row(call, ended[call.row])
         waiting = [call for call in calls if call.row not in ended]
-        reporter = Reporter(progress, len(calls), len(ended))
+        ran, started = Counter[str](), time.monotonic()
         progress.update(len(ended) / len(calls), f"{len(waiting)} of {len(calls)} rows to run")
         try:
             for call, outcome in run_calls(waiting, self.load, self.tool, pool, progress.check):
                 ended[call.row] = outcome
                 log.row(call, outcome)
-                reporter.ended(outcome)
+                ran[outcome.status] += 1
+                line = progress_line(ran, len(ended), len(calls), time.monotonic() - started)
+                progress.update(len(ended) / len(calls), line)
         except CancelledError as error:
             log.write("cancelled")
             raise CancelledError(

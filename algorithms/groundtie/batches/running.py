@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from queue import Empty, SimpleQueue
@@ -10,7 +10,6 @@ from queue import Empty, SimpleQueue
 from ..declaration import Tool
 from ..errors import GroundTieError
 from ..executors import POLL_SECONDS, result_of
-from ..progress import Progress
 from .calls import Call
 from .work import DONE, FAILED, Outcome, Task, bug
 
@@ -66,33 +65,21 @@ def _outcome(future: Future[Outcome]) -> Outcome:
         return Outcome(FAILED, bug(error))
 
 
-class Reporter:
-    """Reports how many rows have ended, how, and how long the others will take."""
+def progress_line(ran: Counter[str], ended: int, rows: int, seconds: float) -> str:
+    """Return how far a batch is, for people; the rest is taken to last as what ran until now.
 
-    def __init__(self, progress: Progress, rows: int, skipped: int) -> None:
-        self._progress = progress
-        self._rows = rows
-        self._skipped = skipped
-        self._ended = skipped
-        self._counts: dict[str, int] = {}
-        self._started = time.monotonic()
-
-    def ended(self, outcome: Outcome) -> None:
-        """Report that one more row has ended."""
-        self._ended += 1
-        self._counts[outcome.status] = self._counts.get(outcome.status, 0) + 1
-        self._progress.update(self._ended / self._rows, self.line())
-
-    def remaining_seconds(self) -> float:
-        """Return how long the rest takes if rows take as long as those until now."""
-        ran = self._ended - self._skipped
-        return (time.monotonic() - self._started) * (self._rows - self._ended) / max(ran, 1)
-
-    def line(self) -> str:
-        """Return how far the batch is, for people."""
-        troubles = [f"{count} {status}" for status, count in self._counts.items() if status != DONE]
-        left = f"{duration(self.remaining_seconds())} left"
-        return ", ".join([f"{self._ended} of {self._rows} rows", *troubles, left])
+    Parameters
+    ----------
+    ran
+        How many rows ran, by how they ended.
+    ended, rows
+        How many rows have ended, with those that an earlier run knew, and how many there are.
+    seconds
+        For how long rows run.
+    """
+    troubles = [f"{count} {status}" for status, count in ran.items() if status != DONE]
+    left_s = seconds * (rows - ended) / ran.total()
+    return ", ".join([f"{ended} of {rows} rows", *troubles, f"{duration(left_s)} left"])
 
 
 def duration(seconds: float) -> str:
