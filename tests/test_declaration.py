@@ -48,6 +48,17 @@ def test_parameters_follow_the_signature_without_progress() -> None:
         assert parameter.default == (None if parameter.required else default)
 
 
+def test_a_parameter_is_called_by_its_name_in_words_where_it_has_no_label() -> None:
+    @tool(title="Named", group="Toys")
+    def named(
+        pixel_size: Annotated[int, Number(help="Size.")],
+        more: Annotated[int, Number(label="Rest", help="Rest.")],
+    ) -> Any:
+        """Name things."""
+
+    assert [p.kind.label for p in tool_of(named).parameters] == ["Pixel size", "Rest"]
+
+
 def test_what_does_not_fit_into_memory_is_an_error_in_one_line() -> None:
     @tool(title="Large", group="Toys")
     def large(size: Annotated[int, Number(label="Size", help="Size.", integer=True)]) -> Any:

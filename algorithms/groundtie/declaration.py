@@ -12,7 +12,7 @@ import inspect
 import operator
 import typing
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
@@ -274,4 +274,6 @@ def _parameter(name: str, kind: Kind, default: Any) -> Parameter:
     if kind.optional_in_python and default is not None:
         raise TypeError(f"parameter {name} is optional in Python: its default must be None")
     required = absent or kind.optional_in_python
+    if not kind.label:
+        kind = replace(kind, label=name.replace("_", " ").capitalize())
     return Parameter(name, kind, required, None if absent else default)

@@ -29,15 +29,16 @@ REPORT_FORMAT = "groundtie-report/1"
 class Kind:
     """What every kind has: a label and a help text.
 
-    `advanced` parameters are folded away in dialogs; `option` makes a required parameter an
-    option with a name on the command line instead of a positional argument. One that is
-    `optional_in_python` is required by the command line and QGIS, which can only write files;
-    Python's callers may leave it out (its default is None) and go on with what is returned. What
-    is `common` means the same for all tools and decides no result: it is none of a tool's own
-    parameters; the command line takes it before the tool's name, too, and QGIS has a setting.
+    The label that dialogs show is by default the parameter's name in words. `advanced` parameters
+    are folded away in dialogs; `option` makes a required parameter an option with a name on the
+    command line instead of a positional argument. One that is `optional_in_python` is required by
+    the command line and QGIS, which can only write files; Python's callers may leave it out (its
+    default is None) and go on with what is returned. What is `common` means the same for all tools
+    and decides no result: it is none of a tool's own parameters; the command line takes it before
+    the tool's name, too, and QGIS has a setting.
     """
 
-    label: str
+    label: str = ""
     help: str
     advanced: bool = False
     option: bool = False

@@ -108,7 +108,6 @@ def assess(
     tie_points: Annotated[
         Path | None,
         FileIn(
-            label="Tie points",
             help="The points of the registration: those with the role fit are control points, "
             "those with the role check are test points.",
             suffixes=SUFFIXES,
@@ -117,7 +116,6 @@ def assess(
     check_points: Annotated[
         Path | None,
         FileIn(
-            label="Check points",
             help="Points that are independent of the registration: tie points, or a CSV table "
             "with the columns reference_x, reference_y and input_col, input_row (or input_x, "
             "input_y).",
@@ -193,7 +191,6 @@ def assess(
     model: Annotated[
         str,
         Choice(
-            label="Model",
             help="What is fitted to tie points where there is no transform.",
             choices=KINDS,
             advanced=True,

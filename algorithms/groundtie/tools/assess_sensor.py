@@ -66,7 +66,6 @@ def assess_sensor(
     check_points: Annotated[
         Path,
         FileIn(
-            label="Check points",
             help="Points that are independent of the refinement. If some have the role check, "
             "these alone count.",
             suffixes=READ_SUFFIXES,
@@ -84,7 +83,7 @@ def assess_sensor(
     dem_datum: sensor.DemDatum = None,
     table: Annotated[
         Path | None,
-        FileOut(label="Table", help="The errors of each point.", suffixes=(".csv",)),
+        FileOut(help="The errors of each point.", suffixes=(".csv",)),
     ] = None,
     picture: Annotated[
         Path | None,

@@ -30,7 +30,6 @@ def batch(
     tool: Annotated[
         str,
         Choice(
-            label="Tool",
             help="Name of the tool to run.",
             choices=tuple(name for name in NAMES if name not in ("batch", "doctor")),
         ),
@@ -38,7 +37,6 @@ def batch(
     table: Annotated[
         Path,
         FileIn(
-            label="Table",
             help="A row for each run, with a column for each parameter that is given, by its name "
             "on the command line or in Python, and perhaps a column name. Paths of inputs begin "
             "at the folder of the table.",
@@ -48,7 +46,6 @@ def batch(
     output_folder: Annotated[
         Path | None,
         FolderOut(
-            label="Output folder",
             help="Paths of outputs begin here, and the results of all rows are written here; by "
             "default the folder of the table.",
         ),
@@ -56,7 +53,6 @@ def batch(
     resume: Annotated[
         bool,
         Flag(
-            label="Resume",
             help="Skip rows that an earlier run has done or refused, by its log: where input "
             "files, parameters, version and outputs are unchanged.",
         ),

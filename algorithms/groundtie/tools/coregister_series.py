@@ -31,7 +31,6 @@ def coregister_series(
     output_folder: Annotated[
         Path,
         FolderOut(
-            label="Output folder",
             help="Registered dates, series.csv, series.gpkg and series.json; what it holds of an "
             "earlier run with the same files and parameters is not done again.",
             writes=(SERIES_JSON, TABLE_CSV, TABLE_GPKG),
@@ -57,7 +56,6 @@ def coregister_series(
     model: Annotated[
         str,
         Choice(
-            label="Model",
             help="Which misregistration is taken out of each date; auto takes for each pair the "
             "simplest that the points justify.",
             choices=(AUTO, *LINEAR_CANDIDATES),
@@ -68,7 +66,6 @@ def coregister_series(
     band: Annotated[
         int | None,
         Number(
-            label="Band",
             help="The band that is matched, from 1; by default the mean of all bands. Registered "
             "images have all bands.",
             integer=True,
@@ -79,7 +76,6 @@ def coregister_series(
     asset: Annotated[
         str | None,
         Text(
-            label="Asset",
             help="Which asset of STAC items is meant; by default the only one that is a raster.",
             advanced=True,
         ),

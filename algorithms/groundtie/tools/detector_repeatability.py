@@ -78,7 +78,6 @@ def detector_repeatability(
     variants: Annotated[
         str,
         Text(
-            label="Variants",
             help="What is compared, separated by commas: each a detector (sift, sift-oct, "
             "sift-isef-oct), and if need be a gradient (differences, recursive, roewa, "
             "roewa-unsigned) and oriented for descriptors that turn with the image, joined by +.",
@@ -87,7 +86,6 @@ def detector_repeatability(
     transform: Annotated[
         Path | None,
         FileIn(
-            label="Transform",
             help="The registration, from reference to input. Without it the input's own "
             "georeferencing is believed.",
             suffixes=(".json",),
@@ -108,12 +106,11 @@ def detector_repeatability(
     ] = None,
     numbers: Annotated[
         Path | None,
-        FileOut(label="Numbers", help="The same as the table, as JSON.", suffixes=(".json",)),
+        FileOut(help="The same as the table, as JSON.", suffixes=(".json",)),
     ] = None,
     size: Annotated[
         int,
         Number(
-            label="Size",
             help="Largest side of the piece in the middle of the overlap that is looked at.",
             unit="px",
             integer=True,

@@ -106,7 +106,6 @@ def estimate_rotation(
     search: Annotated[
         str,
         Choice(
-            label="Search",
             help="How the pose is searched for: rotation-steps, which all registrations use, tries "
             "everything and is the only one that is meant for SAR with optical images. The others "
             "are there to compare: fourier-mellin finds any rotation and scale, radon rotations, "
@@ -118,7 +117,6 @@ def estimate_rotation(
     largest_rotation: Annotated[
         float,
         Number(
-            label="Largest rotation",
             help="Largest rotation either way; 180 allows any.",
             unit="°",
             minimum=0,
@@ -128,7 +126,6 @@ def estimate_rotation(
     smallest_scale: Annotated[
         float,
         Number(
-            label="Smallest scale",
             help="Least length of a reference's pixel in pixels of the input; of georeferenced "
             "images, against the nominal one.",
             minimum=0.25,
@@ -138,7 +135,6 @@ def estimate_rotation(
     largest_scale: Annotated[
         float,
         Number(
-            label="Largest scale",
             help="See the smallest scale.",
             minimum=0.25,
             maximum=4,
@@ -147,7 +143,6 @@ def estimate_rotation(
     search_radius: Annotated[
         float | None,
         Distance(
-            label="Search radius",
             help="How far the input may lie from its nominal position, along rows and columns; "
             "without georeferencing, how far the images' centres are apart, in input pixels. By "
             "default a quarter of the input's longer side.",
@@ -164,7 +159,6 @@ def estimate_rotation(
     similarity: Annotated[
         str,
         Choice(
-            label="Similarity",
             help="What is compared; auto takes what fits the search: mutual information where "
             "it climbs, else the orientation of edges. The search rotation-steps always takes "
             "the latter; ncc compares grey values.",

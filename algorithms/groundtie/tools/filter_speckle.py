@@ -60,7 +60,6 @@ def filter_speckle(
     filter: Annotated[
         str,
         Choice(
-            label="Filter",
             help="enhanced-frost, lee, kuan and gamma-map adapt to how much the image varies "
             "locally; isef smooths everything alike.",
             choices=tuple(FILTERS),
@@ -69,7 +68,6 @@ def filter_speckle(
     window: Annotated[
         int,
         Number(
-            label="Window",
             help="Side of the window, an odd number; isef smooths as much as the mean of it.",
             unit="px",
             integer=True,
@@ -80,7 +78,6 @@ def filter_speckle(
     looks: Annotated[
         float | None,
         Number(
-            label="Looks",
             help="Equivalent number of looks; by default it is estimated from the image.",
             minimum=0.5,
             maximum=10_000,
@@ -89,7 +86,6 @@ def filter_speckle(
     values: Annotated[
         str,
         Choice(
-            label="Values",
             help="Unit of the pixels. Decibels must be made linear before.",
             choices=VALUES,
         ),
@@ -97,7 +93,6 @@ def filter_speckle(
     damping: Annotated[
         float,
         Number(
-            label="Damping",
             help="Of enhanced-frost: larger values keep more of edges, and of speckle.",
             minimum=0,
             maximum=20,

@@ -30,14 +30,13 @@ def mask_regions(
     regions: Annotated[
         Path | None,
         RasterOut(
-            label="Regions",
             help="GeoTIFF that is 1 on homogeneous regions whose shape is that of roads, waters, "
             "fields or squares.",
         ),
     ] = None,
     skeleton: Annotated[
         Path | None,
-        RasterOut(label="Skeleton", help="GeoTIFF that is 1 on the skeleton of long regions."),
+        RasterOut(help="GeoTIFF that is 1 on the skeleton of long regions."),
     ] = None,
     mask_width: general.MaskWidth = WIDTH_M,
     mask_high_percent: general.HighPercent = HIGH_PERCENT,

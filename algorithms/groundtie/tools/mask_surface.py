@@ -36,7 +36,6 @@ def mask_surface(
     reasons: Annotated[
         Path | None,
         RasterOut(
-            label="Reasons",
             help="GeoTIFF with why each pixel takes no part, as a sum: 1 raised, 2 layover, 4 "
             "radar shadow, 8 hidden from the camera, 16 cast shadow, 32 unknown.",
         ),

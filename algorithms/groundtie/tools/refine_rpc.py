@@ -68,7 +68,6 @@ def refine_rpc(
     residuals: Annotated[
         Path | None,
         VectorOut(
-            label="Residuals",
             help="The points with lines from where the refined RPCs see them on the map to where "
             "they are.",
             suffixes=SUFFIXES[:3],

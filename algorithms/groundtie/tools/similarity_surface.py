@@ -49,18 +49,14 @@ def similarity_surface(
     centre_x: Annotated[
         float | None,
         Number(
-            label="Centre x",
             help="Where the window's centre lies, in the CRS of the reference; by default the "
             "middle of the overlap.",
         ),
     ] = None,
-    centre_y: Annotated[
-        float | None, Number(label="Centre y", help="See the centre's x; give both or none.")
-    ] = None,
+    centre_y: Annotated[float | None, Number(help="See the centre's x; give both or none.")] = None,
     chip_size: Annotated[
         int,
         Number(
-            label="Chip size",
             help="Side of the window, in pixels of the matching grid; even numbers get one more.",
             unit="px",
             integer=True,
@@ -71,7 +67,6 @@ def similarity_surface(
     search_radius: Annotated[
         float | None,
         Distance(
-            label="Search radius",
             help=f"Largest shift; by default {DEFAULT_RADIUS_PX} pixels of the matching grid, "
             f"and at most {LARGEST_RADIUS_PX}.",
         ),
@@ -79,7 +74,6 @@ def similarity_surface(
     similarity: Annotated[
         str,
         Choice(
-            label="Similarity",
             help="What is measured: fused (nmi and orientation), mutual information normalised "
             "(nmi) or not (mi), by Rényi's or Tsallis' entropy or by a density ratio (mlmi), the "
             "orientation of edges, correlation of grey values (ncc), cluster reward or "
@@ -94,7 +88,6 @@ def similarity_surface(
     numbers: Annotated[
         Path | None,
         FileOut(
-            label="Numbers",
             help="Peak, its sub-pixel position and covariance, and the second peak.",
             suffixes=(".json",),
         ),
@@ -124,7 +117,6 @@ def similarity_surface(
     binning: Annotated[
         str,
         Choice(
-            label="Binning",
             help="Whether grey levels hold equally many pixels, are equally wide, or are all "
             "grey values that there are (slow).",
             choices=(*BINNINGS, GREY_VALUES),
@@ -146,7 +138,6 @@ def similarity_surface(
     sample: Annotated[
         int,
         Number(
-            label="Sample",
             help="For mlmi: number of pixels of the window that are used.",
             integer=True,
             minimum=50,

@@ -23,7 +23,6 @@ def simulate(
     folder: Annotated[
         Path,
         FolderOut(
-            label="Folder",
             help="Gets reference.tif (SAR), input.tif (optical), dem.tif, dsm.tif, "
             "reference.json and input.json (view angles), truth.json, check_points.csv and "
             "roof_points.csv; input_dem.tif where the terrain has an error.",
@@ -35,7 +34,6 @@ def simulate(
     distortion: Annotated[
         str,
         Choice(
-            label="Distortion",
             help="What is wrong with the georeferencing of the optical image, besides its shift.",
             choices=tuple(DISTORTIONS),
         ),
@@ -43,7 +41,6 @@ def simulate(
     shift: Annotated[
         float,
         Number(
-            label="Shift",
             help="How far the optical image is off; the direction is drawn.",
             unit="px",
             minimum=0,
@@ -65,7 +62,7 @@ def simulate(
     ] = None,
     relief: Annotated[
         float,
-        Distance(label="Relief", help="Range of the terrain's heights.", advanced=True),
+        Distance(help="Range of the terrain's heights.", advanced=True),
     ] = 20.0,
     slope: Annotated[
         float | None,
@@ -91,7 +88,6 @@ def simulate(
     input: Annotated[
         str,
         Choice(
-            label="Input",
             help="Which image has the wrong georeferencing; the other one is the reference.",
             choices=INPUTS,
             advanced=True,
@@ -104,7 +100,6 @@ def simulate(
     rotation: Annotated[
         float,
         Number(
-            label="Rotation",
             help="Rotation of the optical image, for distortions rotation and similarity.",
             unit="°",
             minimum=-30,
@@ -115,7 +110,6 @@ def simulate(
     scale: Annotated[
         float,
         Number(
-            label="Scale",
             help="Scale of the optical image, for distortions scale and similarity.",
             minimum=0.8,
             maximum=1.25,
@@ -125,7 +119,6 @@ def simulate(
     warp: Annotated[
         float,
         Number(
-            label="Warp",
             help="Largest displacement besides the shift, for distortions affine and polynomial.",
             unit="px",
             minimum=0,

@@ -23,7 +23,6 @@ def simulate_sensor(
     folder: Annotated[
         Path,
         FolderOut(
-            label="Folder",
             help="Gets sensor.tif (optical, with RPCs), reference.tif (SAR), dem.tif, "
             "dsm.tif, reference.json and sensor.json (view angles), exact_rpc.txt, truth.json, "
             "check_points.csv and roof_points.csv.",
@@ -32,13 +31,10 @@ def simulate_sensor(
     ],
     size: simulated.Size = 1000,
     density: simulated.Density = "suburban",
-    relief: Annotated[
-        float, Distance(label="Relief", help="Range of the terrain's heights.", maximum=1000)
-    ] = 60.0,
+    relief: Annotated[float, Distance(help="Range of the terrain's heights.", maximum=1000)] = 60.0,
     shift: Annotated[
         float,
         Distance(
-            label="Shift",
             help="How far off on the ground the RPCs are; the direction is drawn.",
             maximum=2000,
         ),
@@ -46,7 +42,6 @@ def simulate_sensor(
     drift: Annotated[
         float,
         Number(
-            label="Drift",
             help="How much their error changes from the first line of the image to the last.",
             unit="px",
             minimum=0,
@@ -56,7 +51,6 @@ def simulate_sensor(
     rotation: Annotated[
         float,
         Number(
-            label="Rotation",
             help="How far they are rotated about the centre of the image.",
             unit="°",
             minimum=-1,
@@ -74,7 +68,6 @@ def simulate_sensor(
     heading: Annotated[
         float,
         Number(
-            label="Heading",
             help="Where the satellite with the camera flies to, clockwise from north.",
             unit="°",
             minimum=0,

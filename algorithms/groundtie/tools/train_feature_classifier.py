@@ -90,7 +90,6 @@ def train_feature_classifier(
     left_out: Annotated[
         str,
         Text(
-            label="Left out",
             help="Values of the attribute or of the raster, separated by commas, whose features "
             "are to be left out; those of all other values are kept.",
         ),
@@ -98,7 +97,6 @@ def train_feature_classifier(
     kernel: Annotated[
         str,
         Choice(
-            label="Kernel",
             help="Of the support vector machine; polynomial is of degree 3, quadratic of 2.",
             choices=KERNELS,
         ),
@@ -106,7 +104,6 @@ def train_feature_classifier(
     statistics: Annotated[
         str,
         Choice(
-            label="Statistics",
             help="What is looked at in the 41 × 41 pixels around a feature: mean and variance of "
             "the grey values, these with the shares of all bands in their sum (band-ratios: clouds "
             "have no colour), or with skewness, gradients and fine detail (texture).",
@@ -116,7 +113,6 @@ def train_feature_classifier(
     band: Annotated[
         int | None,
         Band(
-            label="Band",
             help="The band that is looked at, as it will be matched; by default the mean of all "
             "bands.",
             of="input",

@@ -70,7 +70,6 @@ def warp(
     model: Annotated[
         str,
         Choice(
-            label="Model",
             help="What is fitted to tie points; a stored transform has a model already.",
             choices=KINDS,
         ),

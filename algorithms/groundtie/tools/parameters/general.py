@@ -36,7 +36,6 @@ OptionalGeoTiff = Annotated[Path | None, replace(_GEOTIFF, optional_in_python=Tr
 Resampling = Annotated[
     str,
     Choice(
-        label="Resampling",
         help="How values between the input's pixels are found. Where output pixels are larger "
         "than 1.5 input pixels, the mean of the area is taken first, but for nearest. Images "
         "with a palette are always resampled by nearest.",
@@ -45,7 +44,6 @@ Resampling = Annotated[
     ),
 ]
 _THREADS = Number(
-    label="Workers",
     help="Number of threads; by default one per processor.",
     integer=True,
     minimum=1,
@@ -58,7 +56,6 @@ RowWorkers = Annotated[int | None, replace(_THREADS, help=_ROWS_HELP, common=Fal
 Scheduler = Annotated[
     str | None,
     Text(
-        label="Scheduler",
         help="Address of a Dask scheduler, as tcp://host:8786, whose workers do the work instead.",
         advanced=True,
     ),
@@ -67,7 +64,6 @@ Scheduler = Annotated[
 Seed = Annotated[
     int,
     Number(
-        label="Seed",
         help="Seed of random samples: the same seed gives the same result.",
         integer=True,
         minimum=0,
@@ -155,7 +151,6 @@ MaskGrowth = Annotated[
 TransformOut = Annotated[
     Path | None,
     FileOut(
-        label="Transform",
         help="The transform, for the tool warp or a script.",
         suffixes=(".json",),
     ),
@@ -165,7 +160,6 @@ TransformOut = Annotated[
 def report_page(help: str, *, advanced: bool = False) -> FileOut:
     """Return the kind of a report, beside which its numbers are put."""
     return FileOut(
-        label="Report",
         help=help,
         suffixes=(".html",),
         numbers=True,
@@ -176,7 +170,7 @@ def report_page(help: str, *, advanced: bool = False) -> FileOut:
 
 def picture(help: str) -> FileOut:
     """Return the kind of a picture to look at."""
-    return FileOut(label="Picture", help=help, suffixes=(".png",))
+    return FileOut(help=help, suffixes=(".png",))
 
 
 def like_reference(otherwise: str) -> RasterIn:
@@ -187,4 +181,4 @@ def like_reference(otherwise: str) -> RasterIn:
 
 def pixel_size_of_result(otherwise: str) -> Distance:
     """Return the kind of the result's pixel size."""
-    return Distance(label="Pixel size", help=f"Pixel size of the result{otherwise}.", minimum=1e-6)
+    return Distance(help=f"Pixel size of the result{otherwise}.", minimum=1e-6)

@@ -25,7 +25,6 @@ from .general import MASK_HELP, report_page
 Model = Annotated[
     str,
     Choice(
-        label="Model",
         help="Which misregistration is taken out; auto takes the simplest model that the "
         "points justify.",
         choices=(AUTO, *KINDS),
@@ -45,7 +44,6 @@ MaxError = Annotated[
 TiePointsOut = Annotated[
     Path | None,
     VectorOut(
-        label="Tie points",
         help="Lines from where a point of the input nominally lies to where it is.",
         suffixes=SUFFIXES,
         shown=True,
@@ -55,7 +53,6 @@ TiePointsOut = Annotated[
 DisplacementOut = Annotated[
     Path | None,
     RasterOut(
-        label="Displacement",
         help="GeoTIFF of three bands over the overlap: by how much the input is moved to the east "
         "and to the north, and the standard deviation of that; in metres, without georeferencing "
         "in pixels to the right and down.",
@@ -72,7 +69,6 @@ ReportOut = Annotated[
 SearchRadius = Annotated[
     float | None,
     Distance(
-        label="Search radius",
         help="How far the input may lie from its right place. By default 100 m or 20 pixels of "
         "the coarser image, whichever is larger; match_sar_sar and match_optical search a quarter "
         "of the input's longer side where there is no georeferencing.",
@@ -133,7 +129,6 @@ InputDem = Annotated[
     ),
 ]
 SURFACE_MODEL = MaskIn(
-    label="Surface model",
     help="Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a "
     "field height in metres. Only ground that both images show takes part: no layover, radar "
     "shadow, relief displacement or cast shadow. Needs the views of both images.",
@@ -154,13 +149,12 @@ _TERRAIN_VIEW = (
     "and register tries azimuths. If it is a surface model of a town, 'surface radar azimuth=280 "
     "incidence=35' for a radar image; 'surface radar' takes these from the input's metadata."
 )
-Views = Annotated[str | None, Text(label="Views", help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
-SurfaceViews = Annotated[str | None, Text(label="Views", help=_VIEWS, advanced=True)]
+Views = Annotated[str | None, Text(help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
+SurfaceViews = Annotated[str | None, Text(help=_VIEWS, advanced=True)]
 TerrainView = Annotated[str | None, Text(label="View", help=_TERRAIN_VIEW, advanced=True)]
 OutputGrid = Annotated[
     str,
     Choice(
-        label="Output grid",
         help="Grid of the registered image: the reference's pixels exactly, so that both "
         "stack; pixels like the input's own; or, for a pure shift, the input's untouched "
         "pixels with a corrected geotransform. The last two reach beyond the overlap, where "

@@ -59,7 +59,6 @@ DemCover = Annotated[
 Height = Annotated[
     float | None,
     Number(
-        label="Height",
         help="Height above the ellipsoid that holds everywhere without a terrain model; by "
         "default the RPCs' own.",
         unit="m",
@@ -81,7 +80,6 @@ RpcFile = Annotated[
 RpcSearchRadius = Annotated[
     float | None,
     Distance(
-        label="Search radius",
         help="How far the RPCs may be wrong on the ground. By default 100 m or 20 pixels of the "
         "coarser image, whichever is larger.",
     ),

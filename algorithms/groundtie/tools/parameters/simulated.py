@@ -11,7 +11,6 @@ from ...simulation.scene import DENSITY_NAMES
 Size = Annotated[
     int,
     Number(
-        label="Size",
         help="Width and height of the scene.",
         unit="px",
         integer=True,
@@ -22,7 +21,6 @@ Size = Annotated[
 Density = Annotated[
     str,
     Choice(
-        label="Density",
         help="How much of the scene is built up: rural up to 3 %, suburban up to 25 %, urban "
         "about half, with high buildings; city has streets with cars, courtyards and towers.",
         choices=DENSITY_NAMES,
@@ -31,7 +29,6 @@ Density = Annotated[
 Looks = Annotated[
     float,
     Number(
-        label="Looks",
         help="Number of looks of the SAR image: fewer are noisier.",
         minimum=1,
         maximum=100,
@@ -50,7 +47,7 @@ Changed = Annotated[
 ]
 PixelSize = Annotated[
     float,
-    Distance(label="Pixel size", help="Pixel size of the SAR image.", minimum=0.1, advanced=True),
+    Distance(help="Pixel size of the SAR image.", minimum=0.1, advanced=True),
 ]
 Incidence = Annotated[
     float,
@@ -66,7 +63,6 @@ Incidence = Annotated[
 Orbit = Annotated[
     str,
     Choice(
-        label="Orbit",
         help="Ascending: the radar looks east; descending: it looks west.",
         choices=ORBITS,
         advanced=True,
@@ -86,7 +82,6 @@ OffNadir = Annotated[
 ViewAzimuth = Annotated[
     float,
     Number(
-        label="View azimuth",
         help="Where the camera is, seen from the ground, clockwise from north.",
         unit="°",
         minimum=0,
