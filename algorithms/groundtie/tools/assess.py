@@ -160,8 +160,8 @@ def assess(
     report: Annotated[
         Path | None,
         general.report_page(
-            "A page with the errors and, if both images are given, swipe and checkerboard; "
-            "its numbers are put beside it as JSON. It is written for a refusal, too.",
+            "A page with the errors and, if both images are given, swipe and checkerboard",
+            "a refusal",
         ),
     ] = None,
     onward_transform: Annotated[

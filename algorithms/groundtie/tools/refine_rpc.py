@@ -78,8 +78,8 @@ def refine_rpc(
     report: Annotated[
         Path | None,
         general.report_page(
-            "A page that shows errors before and after and how far to trust them; its numbers "
-            "are put beside it as JSON. It is written for refused RPCs, too.",
+            "A page that shows errors before and after and how far to trust them",
+            "refused RPCs",
             advanced=True,
         ),
     ] = None,

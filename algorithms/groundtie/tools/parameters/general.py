@@ -157,10 +157,10 @@ TransformOut = Annotated[
 ]
 
 
-def report_page(help: str, *, advanced: bool = False) -> FileOut:
+def report_page(shows: str, refused: str, *, advanced: bool = False) -> FileOut:
     """Return the kind of a report, beside which its numbers are put."""
     return FileOut(
-        help=help,
+        help=f"{shows}; its numbers are put beside it as JSON. It is written for {refused}, too.",
         suffixes=(".html",),
         numbers=True,
         advanced=advanced,

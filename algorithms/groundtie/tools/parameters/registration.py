@@ -61,10 +61,7 @@ DisplacementOut = Annotated[
 ]
 ReportOut = Annotated[
     Path | None,
-    report_page(
-        "A page that shows the result and how far to trust it; its numbers are put "
-        "beside it as JSON. It is written for a refused registration, too.",
-    ),
+    report_page("A page that shows the result and how far to trust it", "a refused registration"),
 ]
 SearchRadius = Annotated[
     float | None,
