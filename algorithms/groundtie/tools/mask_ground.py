@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from ..declaration import Output, given_files, tool
+from ..declaration import given_files, tool
 from ..masks.ground import find_ground
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-from .results import WrittenMask
+from .results import SHARE_OUTPUT, WrittenMask
 
 
-@tool(
-    title="Mask by layover and shadow",
-    group="Radar",
-    outputs=(Output("SHARE", "Share of the pixels that take part", "share"),),
-)
+@tool(title="Mask by layover and shadow", group="Radar", outputs=(SHARE_OUTPUT,))
 def mask_ground(
     input: general.Radar,
     output: general.MaskOut,

@@ -13,14 +13,14 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import bounded_cache, open_raster
 from .parameters import general
-from .results import WrittenMask
+from .results import SHARE_OUTPUT, WrittenMask
 
 
 @tool(
     title="Mask by regions",
     group="Radar",
     outputs=(
-        Output("SHARE", "Share of the pixels that take part", "share"),
+        SHARE_OUTPUT,
         Output("SKELETON_M", "Length of the skeleton (m)", "skeleton_m"),
     ),
 )

@@ -18,14 +18,14 @@ from ..rasters.reading import bounded_cache, open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import fitted_ground
 from .parameters import general, registration
-from .results import WrittenMask
+from .results import SHARE_OUTPUT, WrittenMask
 
 
 @tool(
     title="Mask by a surface model",
     group="Radar",
     outputs=(
-        Output("SHARE", "Share of the pixels that take part", "share"),
+        SHARE_OUTPUT,
         Output("CORRELATION", "Correlation with the surface model", "correlation"),
     ),
 )

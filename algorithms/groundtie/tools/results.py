@@ -10,6 +10,7 @@ from typing import Any
 from ..declaration import Output, file_lines, given_files
 from ..rasters.grid import Grid, crs_name
 
+SHARE_OUTPUT = Output("SHARE", "Share of the pixels that take part", "share")
 SIZE_OUTPUTS = (
     Output("WIDTH", "Width of the result in pixels", "width"),
     Output("HEIGHT", "Height of the result in pixels", "height"),
