@@ -44,7 +44,7 @@ def series(times: list[datetime.datetime | None]) -> Series:
         for k in range(3)
     )
     none = np.zeros(0, bool)
-    adjustment = Adjustment(np.zeros((3, 6)), np.zeros((3, 6, 6)), none, np.zeros(0), 0.05, none)
+    adjustment = Adjustment(np.zeros((3, 6)), np.zeros((3, 6, 6)), none, 0.05, none)
     closures = (Closure((0, 1, 2), 0.2, 0.1, 4.0, True),)
     open_ = (Closure((0, 1, 2), 3.0, 0.1, 400.0, False),)
     settled = Settled(verdicts, closures, open_, adjustment, ((0, 2),))

@@ -82,9 +82,6 @@ class Adjustment:
         Of each date against the frame, shapes (n, 6) and (n, 6, 6); NaN for those not reached.
     kept
         Which links were used, shape (m,): no outliers, and connected with the hub.
-    statistics
-        Squared normalised residual of each link, shape (m,): that with which it was rejected, or
-        has at last; NaN where no other link controls it.
     scatter_px
         What links scatter by beside their own covariance.
     confirmed
@@ -94,7 +91,6 @@ class Adjustment:
     displacements: FloatArray
     covariances: FloatArray
     kept: Mask
-    statistics: FloatArray
     scatter_px: float
     confirmed: Mask
 
@@ -133,20 +129,18 @@ def adjust(
         Let the mean displacement of all dates be zero instead.
     """
     kept = np.array([True] * len(links), bool)
-    statistics = np.full(len(links), np.nan)
     largest = largest_statistic(links)
     while True:
         kept &= _reached(links, kept, count, hub)
         network = _Network(frame, list(compress(links, kept)), count, hub)
         solution = network.settled()
         found = network.statistics(solution)
-        statistics[kept] = found
         if not np.any(found > largest):
             break
         kept[np.flatnonzero(kept)[np.nanargmax(found)]] = False
     displacements, covariances = solution.of_dates(frame, is_free)
     confirmed = network.confirmed()
-    return Adjustment(displacements, covariances, kept, statistics, solution.scatter_px, confirmed)
+    return Adjustment(displacements, covariances, kept, solution.scatter_px, confirmed)
 
 
 @dataclass(frozen=True)
