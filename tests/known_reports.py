@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,11 +20,15 @@ from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import NONE, MaskUsed
+from groundtie.matching.survey import Survey
+from groundtie.matching.surveys import Surveys
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
+from groundtie.registration.registration import Registration
 from groundtie.registration.verdict import Verdict
+from groundtie.report.correction import Correction
 from groundtie.report.report import Report
 
 GRID = utm_grid(160, 120)
@@ -80,7 +85,6 @@ def variants(pair: ImagePair, tmp_path_factory: pytest.TempPathFactory) -> list[
         for report in (
             report_of(pair),
             refused(pair),
-            refused(pair, points=points),
             refused(pair, points=points, transform=transform),
             refused(pair, points=points.take(slice(0, 12)), transform=transform),
             refused(pair, points=points.take(slice(0, 0)), transform=transform),
@@ -138,24 +142,52 @@ def peak_surface(x: float, y: float, height: float = 9.0) -> np.ndarray:
 
 
 def report_of(pair: ImagePair, **changes: Any) -> Report:
+    """Return the report on a registration of a pair, or one that differs from it."""
     transform = transform_of(pair)
-    report = Report(
-        title="input.tif registered to reference.tif",
-        verdict=ACCEPTED,
-        pair=pair,
-        points=points_of(pair, transform),
-        transform=transform,
-        surfaces=(
+    page = {
+        "title": "input.tif registered to reference.tif",
+        "parameters": {"similarity": "fused", "max_error": 3.0},
+        "seconds": 4.56,
+    }
+    shown = {
+        "verdict": ACCEPTED,
+        "points": points_of(pair, transform),
+        "transform": transform,
+        "surfaces": (
             ("best check point", peak_surface(1, -2)),
             ("worst check point", peak_surface(6, 3, 4.0)),
         ),
-        mask=MaskUsed(NONE, None, 1.0, "none was asked for"),
-        scene={},
-        survey=None,
-        parameters={"similarity": "fused", "max_error": 3.0},
-        seconds=4.56,
+        "mask": MaskUsed(NONE, None, 1.0, "none was asked for"),
+        "scene": {},
+        "survey": None,
+        "beyond": None,
+        "tried": (),
+    }
+    own = {name: changes.pop(name, value) for name, value in page.items()}
+    return Report(registration_of(pair, **(shown | changes)), **own)  # type: ignore[arg-type]
+
+
+def registration_of(
+    pair: ImagePair,
+    points: TiePoints | None,
+    transform: Transform | None,
+    surfaces: tuple[tuple[str, np.ndarray], ...],
+    scene: dict[str, Any],
+    survey: Survey | None,
+    **more: Any,
+) -> Registration:
+    """Return what a report reads of a registration."""
+    found = SimpleNamespace(
+        pair=pair,
+        tie_points=points,
+        transform=transform,
+        correction=None if transform is None else Correction.of(transform, pair.grid),
+        extreme_surfaces=lambda: surfaces,
+        scene=SimpleNamespace(facts=lambda: scene),
+        evidence=SimpleNamespace(surveys=Surveys(survey)),
+        **more,
     )
-    return replace(report, **changes)
+    return cast(Registration, found)
 
 
 def refused(pair: ImagePair, **changes: Any) -> Report:

@@ -121,7 +121,7 @@ def test_the_json_is_the_summary(variants: list[Variant]) -> None:
             *("format", "verdict", "correction", "transform", "mask", "scene"),
             *("parameters", "versions", "seconds"),
         ]
-        assert variant.numbers["verdict"] == variant.report.verdict.summary()
+        assert variant.numbers["verdict"] == variant.report.registration.verdict.summary()
 
 
 def test_the_transform_comes_back_from_the_json(pair: ImagePair, variants: list[Variant]) -> None:
@@ -169,13 +169,6 @@ def test_refused_without_a_transform(pair: ImagePair, tmp_path: Path) -> None:
     assert not [e for e in page.all("input") if e.attributes.get("name") == "state"]
     assert len(page.all("img")) == 2
     assert numbers_in(tmp_path)["transform"] is None
-
-
-def test_refused_with_points_only(pair: ImagePair, tmp_path: Path) -> None:
-    page = written(refused(pair, points=points_of(pair, transform_of(pair))), tmp_path)
-    assert "Tie points on the map" in [e.text for e in page.all("h2")]
-    assert "times as long" not in page.text
-    assert "Errors at check points" not in [e.text for e in page.all("h2")]
 
 
 @pytest.mark.slow

@@ -98,6 +98,11 @@ class Registration:
         return None if self.evidence is None else self.evidence.estimate.transform
 
     @property
+    def correction(self) -> Correction | None:
+        """How far the transform moves the input."""
+        return None if self.transform is None else Correction.of(self.transform, self.pair.grid)
+
+    @property
     def tie_points(self) -> TiePoints | None:
         """All tie points, those of the fit first."""
         if self.evidence is None:
@@ -198,23 +203,14 @@ class Registration:
         with Outputs() as outputs:
             self.page().write(outputs, html)
 
-    def page(self, with_surfaces: bool = True) -> Report:
-        """Return the report; without surfaces, its numbers are the same."""
+    def page(self) -> Report:
+        """Return the report."""
         names = [file_name(image.source.path) for image in (self.pair.input, self.pair.reference)]
         return Report(
+            self,
             title=f"{names[0]} registered to {names[1]}",
-            verdict=self.verdict,
-            pair=self.pair,
-            mask=self.mask,
-            scene=self.scene.facts(),
-            points=self.tie_points,
-            transform=self.transform,
-            surfaces=self.extreme_surfaces() if with_surfaces else (),
-            survey=None if self.evidence is None else self.evidence.surveys.whole,
-            tried=self.tried,
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
-            beyond=self.beyond,
         )
 
     def extreme_surfaces(self) -> tuple[tuple[str, Surface], ...]:
@@ -229,18 +225,18 @@ class Registration:
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         return {
-            **self.page(with_surfaces=False).summary(),
+            **self.page().summary(),
             "scene": self.scene.summary(),
             "files": given_files(self.files),
         }
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        v, transform = self.verdict, self.transform
+        v, transform, correction = self.verdict, self.transform, self.correction
         word = "accepted" if v.accepted else "refused"
         lines = [*self.tried, f"{word}: {v.sentence()}"]
-        if transform is not None:
-            lines.insert(0, f"correction: {Correction.of(transform, self.pair.grid).text()}")
+        if correction is not None:
+            lines.insert(0, f"correction: {correction.text()}")
         if v.accepted and transform is not None:
             lines += [
                 f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..assessment.point_errors import PointErrors
 from ..geometry.judging import CE90_FACTOR, FEWEST_CHECK_POINTS, TOLERANCE_PX
-from ..geometry.tie_points import TiePoints
 from ..rasters.grid import FloatArray, Grid
 from ..registration.verdict import Verdict
 from .pictures import data_uri
@@ -147,16 +146,6 @@ def residual_map(errors: PointErrors, grid: Grid) -> Figure:
     ):
         draw_arrows(axes, errors.position_px[which], arrows.vector_px[which], colour, strength)
     draw_scale(axes, arrows, grid)
-    return axes.figure
-
-
-def point_map(points: TiePoints, grid: Grid) -> Figure:
-    """Draw where points lie when there is no transform to disagree with."""
-    axes = map_axes(grid)
-    px = grid.map_to_pixel(points.reference_xy)
-    axes.plot(*px[~points.used].T, ".", color=REJECTED_COLOUR, ms=3.5)
-    axes.plot(*px[points.fit].T, ".", color=FIT_COLOUR, ms=4)
-    axes.plot(*px[points.check].T, "o", color=CHECK_COLOUR, mfc="none", ms=7)
     return axes.figure
 
 

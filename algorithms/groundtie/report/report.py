@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..assessment.comparison import Comparison, without_masks
 from ..assessment.point_errors import PointErrors
-from ..geometry.tie_points import TiePoints
-from ..geometry.transform import Transform
-from ..masks.used import MaskUsed
 from ..matching.survey import Survey
-from ..rasters.pair import ImagePair
-from ..registration.registered_output import BeyondOverlap
-from ..registration.verdict import Verdict
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from . import details, figures, parts, pictures
-from .correction import Correction
 from .page import Page
+
+if TYPE_CHECKING:
+    from ..registration.registration import Registration
 
 
 @dataclass(frozen=True)
@@ -28,91 +23,67 @@ class Report(Page):
 
     Parameters
     ----------
-    verdict
-        Whether the registration can be trusted.
-    pair
-        The images; their rasters are open.
-    points
-        All tie points; None if the registration did not come as far.
-    transform
-        The transform, also a refused one; None if there is none.
-    surfaces
-        Labels and similarity surfaces, shape (2 r + 1, 2 r + 1), of remarkable points.
-    mask
-        Which mask was used.
-    scene
-        Facts about the images by their names.
-    survey
-        What chips all over the overlap show of parts that lie elsewhere; None: not looked at.
-    beyond
-        What of the written image lies outside of the overlap; None: nothing.
-    tried
-        What was tried, a line each; empty where there was nothing to choose.
+    registration
+        What is shown; its rasters are open.
     """
 
-    verdict: Verdict
-    pair: ImagePair
-    points: TiePoints | None
-    transform: Transform | None
-    surfaces: tuple[tuple[str, Surface], ...]
-    mask: MaskUsed
-    scene: Mapping[str, Any]
-    survey: Survey | None
-    beyond: BeyondOverlap | None = None
-    tried: tuple[str, ...] = ()
+    registration: Registration
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
-        moved, beyond = self.correction(), self.beyond
+        found, survey = self.registration, self._survey
+        correction, transform, beyond = found.correction, found.transform, found.beyond
         return {
-            "verdict": self.verdict.summary(),
-            "correction": None if moved is None else moved.summary(),
-            "transform": None if self.transform is None else self.transform.to_json(),
-            "mask": self.mask.summary(),
-            "scene": dict(self.scene),
-            **({} if self.survey is None else {"parts": parts.summary(self.survey)}),
+            "verdict": found.verdict.summary(),
+            "correction": None if correction is None else correction.summary(),
+            "transform": None if transform is None else transform.to_json(),
+            "mask": found.mask.summary(),
+            "scene": found.scene.facts(),
+            **({} if survey is None else {"parts": parts.summary(survey)}),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
-            **({"tried": list(self.tried)} if self.tried else {}),
+            **({"tried": list(found.tried)} if found.tried else {}),
         }
-
-    def correction(self) -> Correction | None:
-        """Return how far the transform moves the input; None without one."""
-        return None if self.transform is None else Correction.of(self.transform, self.pair.grid)
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
-        found, grid = self.transform, self.pair.grid
-        beyond = () if self.beyond is None else (self.beyond.line(),)
+        found, pair, survey = self.registration, self.registration.pair, self._survey
+        beyond = () if found.beyond is None else (found.beyond.line(),)
         return {
-            "verdict": self.verdict,
-            "grid": grid,
-            "notes": [*self.pair.notes(), self.mask.line(), *beyond],
-            "metres": grid.metres_per_pixel,
-            "model": None if found is None else found.model.kind,
-            "correction": self.correction(),
-            "pictures": Comparison.of(self.pair, found),
-            "residuals": None if self.points is None else self._residual_figures(self.points),
-            "surfaces": [_shown_surface(label, surface) for label, surface in self.surfaces],
-            "scene": self.scene,
-            "tried": self.tried,
-            "details": self._details(),
-            "parts": None if self.survey is None else parts.shown(self.survey),
+            "verdict": found.verdict,
+            "grid": pair.grid,
+            "notes": [*pair.notes(), found.mask.line(), *beyond],
+            "metres": pair.grid.metres_per_pixel,
+            "model": None if found.transform is None else found.transform.model.kind,
+            "correction": found.correction,
+            "pictures": Comparison.of(pair, found.transform),
+            "surfaces": [_shown_surface(*labelled) for labelled in found.extreme_surfaces()],
+            "scene": found.scene.facts(),
+            "tried": found.tried,
+            "parts": None if survey is None else parts.shown(survey),
+            **self._at_points(),
         }
 
-    def _details(self) -> list[dict[str, Any]]:
-        """Return chips at full resolution; none without a transform."""
-        if self.transform is None or self.points is None:
-            return []
-        errors = PointErrors.on_grid(self.points, self.transform, self.pair.grid)
-        return details.shown(without_masks(self.pair), self.transform, errors)
+    @property
+    def _survey(self) -> Survey | None:
+        """What chips all over the overlap show; None: not looked at."""
+        evidence = self.registration.evidence
+        return None if evidence is None else evidence.surveys.whole
 
-    def _residual_figures(self, points: TiePoints) -> dict[str, Any]:
+    def _at_points(self) -> dict[str, Any]:
+        """Return residuals, and chips at full resolution; nothing without a transform."""
+        found, pair = self.registration, self.registration.pair
+        if found.transform is None or found.tie_points is None:
+            return {"residuals": None, "details": []}
+        errors = PointErrors.on_grid(found.tie_points, found.transform, pair.grid)
+        return {
+            "residuals": self._residual_figures(errors),
+            "details": details.shown(without_masks(pair), found.transform, errors),
+        }
+
+    def _residual_figures(self, errors: PointErrors) -> dict[str, Any]:
         """Return the figures that the points allow."""
-        grid, verdict = self.pair.grid, self.verdict
-        if self.transform is None:
-            return {"map": figures.svg_uri(figures.point_map(points, grid)), "errors": False}
-        errors = PointErrors.on_grid(points, self.transform, grid)
+        grid, verdict = self.registration.pair.grid, self.registration.verdict
         shown: dict[str, Any] = {
             **figures.shown_residuals(errors, grid),
             "errors": bool(errors.check.any()),
