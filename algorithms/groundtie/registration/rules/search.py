@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from ...errors import AmbiguousPlaceError, NothingFoundError, TooFewPointsError
+from collections.abc import Callable
+
+from ...errors import AmbiguousPlaceError, GroundTieError, NothingFoundError, TooFewPointsError
 from ..evidence import SearchEvidence
 from .rule import WIDER, Rule
 
 
-def _ambiguous(evidence: SearchEvidence) -> str | None:
-    failure = evidence.failure
-    return str(failure) if isinstance(failure, AmbiguousPlaceError) else None
+def _ended_with(kind: type[GroundTieError]) -> Callable[[SearchEvidence], str | None]:
+    def reason(evidence: SearchEvidence) -> str | None:
+        # An ambiguous place is a NothingFoundError, too, with a rule of its own.
+        return str(evidence.failure) if type(evidence.failure) is kind else None
 
-
-def _nothing_found(evidence: SearchEvidence) -> str | None:
-    failure = evidence.failure
-    is_none = isinstance(failure, NothingFoundError) and not isinstance(
-        failure, AmbiguousPlaceError
-    )
-    return str(failure) if is_none else None
-
-
-def _too_few_points(evidence: SearchEvidence) -> str | None:
-    failure = evidence.failure
-    return str(failure) if isinstance(failure, TooFewPointsError) else None
+    return reason
 
 
 SEARCH_RULES: tuple[Rule, ...] = (
@@ -33,7 +25,7 @@ SEARCH_RULES: tuple[Rule, ...] = (
         "suite crossings and repetitive scenes",
         "give a larger part of the scene, or a matching pixel size that shows more than what "
         "repeats",
-        _ambiguous,
+        _ended_with(AmbiguousPlaceError),
         is_final=True,
     ),
     Rule(
@@ -41,13 +33,13 @@ SEARCH_RULES: tuple[Rule, ...] = (
         "no place matches better than random ones would",
         "expected false alarms above 1; [Moisan2004]",
         f"{WIDER} (with coregister, match_sar_sar or match_optical)",
-        _nothing_found,
+        _ended_with(NothingFoundError),
     ),
     Rule(
         "too few points",
         "fewer points match, or agree, than the model needs",
         "number of parameters of the model",
         "give a larger part of the scene, or a simpler model",
-        _too_few_points,
+        _ended_with(TooFewPointsError),
     ),
 )
