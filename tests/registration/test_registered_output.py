@@ -144,7 +144,11 @@ def test_a_reference_grid_in_another_crs_than_the_transform_shows_the_same_groun
 def test_what_lies_outside_of_the_overlap(overlap: Grid, share: float) -> None:
     """The input is moved by 4 px to the right and 3 px down, to its place."""
     transform = Transform(shift_on_map(-40.0, 30.0), UTM, GRID)
-    beyond = BeyondOverlap.of(transform, overlap.covers)
+    assert BeyondOverlap.of("reference", transform, overlap.covers) is None
+    beyond = BeyondOverlap.of("input", transform, overlap.covers)
+    if beyond is None:
+        assert share == 0
+        return
     assert beyond.share == pytest.approx(share, abs=0.02)
     assert not beyond.bends
     assert "warning" not in beyond.line()
@@ -161,4 +165,5 @@ def test_models_that_bend_are_warned_of(kind: str) -> None:
 
 def test_positions_that_nothing_leads_to_lie_outside() -> None:
     transform = Transform(shift_on_map(math.nan, 0.0), UTM, GRID)
-    assert BeyondOverlap.of(transform, GRID.covers).share == 1
+    beyond = BeyondOverlap.of("input", transform, GRID.covers)
+    assert beyond is not None and beyond.share == 1

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..context import Context
 from ..errors import ParameterError
@@ -17,16 +16,13 @@ from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
 from ..rasters.grid import Grid, PointFunction
-from ..rasters.reading import RasterSource
+from ..rasters.reading import Mask, RasterSource
 from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.vrt import write_vrt
 
 REFERENCE_GRID, UNTOUCHED = "reference", "untouched"
 OUTPUT_GRIDS = (REFERENCE_GRID, "input", UNTOUCHED)
-
-# Returns which of some positions on the reference's map, (n, 2), lie where a transform was checked.
-IsChecked = Callable[[FloatArray], NDArray[np.bool_]]
 
 # Models that bend ever more where no point holds them.
 _BENDING = ("polynomial2", "polynomial3", "tps")
@@ -114,18 +110,27 @@ class BeyondOverlap:
     model: str
 
     @classmethod
-    def of(cls, transform: Transform, is_checked: IsChecked) -> BeyondOverlap:
-        """Return what of a transform's raster lies beyond where it was checked."""
-        xy = transform.inverse(transform.input_grid.lattice(_PLACES))
-        return cls(1 - float(is_checked(xy).mean()), transform.model.kind)
+    def of(
+        cls, grid: str, transform: Transform, is_checked: Callable[[FloatArray], Mask]
+    ) -> BeyondOverlap | None:
+        """Return what of a transform's raster is written beyond where it was checked.
 
-    @classmethod
-    def on(cls, grid: str, transform: Transform, is_checked: IsChecked) -> BeyondOverlap | None:
-        """Return as `of` what is written beyond, onto one of `OUTPUT_GRIDS`; None: nothing."""
+        None: nothing.
+
+        Parameters
+        ----------
+        grid
+            Onto which of `OUTPUT_GRIDS` it is written.
+        transform
+            The transform.
+        is_checked
+            Returns which of some positions on the reference's map, (n, 2), lie where it was.
+        """
         if grid == REFERENCE_GRID:
             return None
-        found = cls.of(transform, is_checked)
-        return found if found.share >= _LEAST_BEYOND else None
+        xy = transform.inverse(transform.input_grid.lattice(_PLACES))
+        share = 1 - float(is_checked(xy).mean())
+        return cls(share, transform.model.kind) if share >= _LEAST_BEYOND else None
 
     @property
     def bends(self) -> bool:

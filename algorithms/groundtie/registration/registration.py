@@ -189,7 +189,7 @@ class Registration:
             That of the raster; None: of the input.
         """
         assert self.evidence is not None
-        return BeyondOverlap.on(grid, transform or self.accepted(), self.evidence.grid.covers)
+        return BeyondOverlap.of(grid, transform or self.accepted(), self.evidence.grid.covers)
 
     def report(self, path: Path | str) -> None:
         """Write the report, an HTML page, and its numbers beside it as JSON.

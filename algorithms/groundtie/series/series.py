@@ -217,7 +217,7 @@ class Series:
             seen = [one.input_grid.contains(one(xy)) for one in others]
             return np.any(seen, axis=0)
 
-        return BeyondOverlap.on(grid, date.transform, is_checked)
+        return BeyondOverlap.of(grid, date.transform, is_checked)
 
     def beyond_line(self) -> str:
         """Return what of the dates nothing has checked as a line of text; empty: nothing."""
