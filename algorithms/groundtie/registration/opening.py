@@ -81,17 +81,6 @@ def open_pair(
         yield pair_images(opened[0], opened[1], spec, context, masks, stack, started)
 
 
-def _reach_notes(images: ImagePair, asked_m: float | None) -> list[str]:
-    """Return a warning where a search was asked for that goes beyond the images."""
-    reach_m = images.limits.radius
-    if asked_m is None or asked_m <= reach_m:
-        return []
-    return [
-        f"warning: a search radius of {asked_m:.6g} m reaches beyond the images: all shifts up to "
-        f"{reach_m:.4g} m are searched, which may take minutes; a smaller one is faster and safer"
-    ]
-
-
 def pair_images(
     reference: Image,
     input: Image,
@@ -121,7 +110,15 @@ def pair_images(
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,
     )
-    for note in (*_reach_notes(images, radius_m), *images.notes()):
+    reach_m = images.limits.radius
+    if radius_m is not None and radius_m > reach_m:
+        context.update(
+            0.0,
+            f"warning: a search radius of {radius_m:.6g} m reaches beyond the images: all shifts "
+            f"up to {reach_m:.4g} m are searched, which may take minutes; a smaller one is faster "
+            "and safer",
+        )
+    for note in images.notes():
         context.update(0.0, note)
     pair, used = with_user_masks(images, masks, stack, context.part(0.0, 0.02))
     return OpenPair(images, pair, used, stack, started)
