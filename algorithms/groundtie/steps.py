@@ -118,7 +118,7 @@ def match_chips(
         Threads and progress; None: a thread for each processor.
     """
     model = shift_model(0.0, 0.0) if model is None else model
-    with _stages(reference, input, spec, context) as (stages, _, running):
+    with _stages(reference, input, spec, context) as (stages, running):
         places = stages.matcher.fit_places(stages.held_out.layout)
         surfaces = stages.matcher.match(model, places, radius_px, running)
         points = check_points(stages.masked.pair, surfaces, model)
@@ -223,7 +223,7 @@ def judge(
     context
         Threads and progress; None: a thread for each processor.
     """
-    with _stages(reference, input, spec, context) as (stages, scene, running):
+    with _stages(reference, input, spec, context) as (stages, running):
         pair = stages.masked.pair
         transform = Transform(model, pair.grid.crs, pair.input.source.grid)
         used = points.take(points.used)
@@ -233,7 +233,7 @@ def judge(
             without_blocks = fit_without_blocks(model.kind, px, nominal_px, np.ones(len(px)))
             estimate = Estimate(transform, points, without_blocks)
             check = stages.check(model, running)
-            return judge_estimate(stages, estimate, check, scene, running)[1]
+            return judge_estimate(stages, estimate, check, running)[1]
         except TooFewPointsError as error:
             return judge_search(error)
 
@@ -241,7 +241,7 @@ def judge(
 @contextmanager
 def _stages(
     reference: Any, input: Any, spec: Specification, context: Context | None
-) -> Iterator[tuple[Stages, SceneInfo, Context]]:
+) -> Iterator[tuple[Stages, Context]]:
     """Open a pair and put the stages of its registration together."""
     with (
         threads() if context is None else nullcontext(context) as running,
@@ -250,7 +250,7 @@ def _stages(
     ):
         scene = SceneInfo.of(opened.pair, spec.radar)
         masked = mask_pair(opened, spec, scene, running.quiet())
-        yield Stages.of(opened.images, masked, spec), scene, running
+        yield Stages.of(opened.images, masked, spec), running
 
 
 def _patch(image: ArrayLike) -> Patch:

@@ -83,9 +83,8 @@ def test_a_registration_has_a_transform_points_and_a_verdict(
     assert points.is_check.sum() == registration.verdict.check_points
     # No check point lies among the pixels that the fit saw.
     px = textured.grid.map_to_pixel(points.reference_xy)
-    stages = Stages.of(
-        registration.pair, Masked(registration.pair, registration.mask), registration.spec
-    )
+    masked = Masked(registration.pair, registration.scene, registration.mask)
+    stages = Stages.of(registration.pair, masked, registration.spec)
     held_out = stages.held_out.layout.held_out(*px.T)
     np.testing.assert_array_equal(held_out, points.is_check)
 
@@ -231,8 +230,8 @@ def test_tries_count_against_agreement_by_chance(
         stages = Stages.of(pair.images, masked, spec)
         found = run(pair, spec, context)
         assert found.evidence is not None and found.check is not None
-        surveys = stages.survey(found.evidence.estimate, found.scene, context)
-        evidence = stages.evidence(found.evidence.estimate, found.check, surveys, scene)
+        surveys = stages.survey(found.evidence.estimate, context)
+        evidence = stages.evidence(found.evidence.estimate, found.check, surveys)
         once = replace(evidence, tries=1).held_out.log10_chance
         assert evidence.held_out.log10_chance == pytest.approx(once + more)
         assert found.verdict.log10_chance == pytest.approx(once + more)

@@ -22,7 +22,8 @@ from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.asked import asked_surface
-from groundtie.registration.scene import scene_of
+from groundtie.registration.masks import Masked
+from groundtie.registration.scene import SceneInfo, scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
 from groundtie.registration.surface_masks import (
     ModelFit,
@@ -91,6 +92,12 @@ def moved(model: Path, path: Path, east_m: float, north_m: float) -> Path:
     return path
 
 
+def masked_by(
+    pair: ImagePair, surface: StatedSurface, stack: ExitStack, context: Context
+) -> Masked:
+    return with_surface_mask(pair, SceneInfo.of(pair), surface, stack, context)
+
+
 @pytest.mark.slow
 def test_a_model_that_lies_right_is_found_there(city: Path, stack: ExitStack) -> None:
     fit = fit_on(scene_of(pair_of(city, stack), REFERENCE), stated(city), stack)
@@ -102,9 +109,9 @@ def test_a_model_that_lies_off_is_moved_to_where_the_reference_shows_it(
     city: Path, stack: ExitStack, tmp_path: Path, context: Context
 ) -> None:
     pair = pair_of(city, stack)
-    right = with_surface_mask(pair, stated(city), stack, context)
+    right = masked_by(pair, stated(city), stack, context)
     model = moved(city / "dsm.tif", tmp_path / "moved.tif", 7.0, 4.0)
-    off = with_surface_mask(pair, stated(city, model), stack, context)
+    off = masked_by(pair, stated(city, model), stack, context)
     assert (right.used.kind, right.used.image) == (SURFACE, REFERENCE)
     assert right.used.is_ground and right.used.is_reliable and right.used.leaves_little
     assert right.used.elevated_px == pytest.approx(0.25)
@@ -123,7 +130,7 @@ def test_a_model_of_another_city_is_not_found(
     city: Path, other_city: Path, stack: ExitStack, context: Context
 ) -> None:
     other = stated(city, other_city / "dsm.tif")
-    used = with_surface_mask(pair_of(city, stack), other, stack, context).used
+    used = masked_by(pair_of(city, stack), other, stack, context).used
     assert not used.is_reliable and "shows nothing" in used.reason
 
 
@@ -152,7 +159,7 @@ def test_nothing_is_expected_of_a_camera_without_the_sun(
     right, pair = stated(city), pair_of(city, stack, turned=True)
     camera = replace(right.views[1], sun_azimuth_deg=None, sun_elevation_deg=None)
     turned = replace(right, views=(camera, right.views[0]))
-    masked = with_surface_mask(pair, turned, stack, context)
+    masked = masked_by(pair, turned, stack, context)
     assert masked.used.is_reliable and "moved" not in masked.used.reason
     assert masked.surface is not None and masked.surface.offset_px == (0, 0)
 
@@ -163,7 +170,7 @@ def test_a_model_of_nowhere_is_refused(
     pair = pair_of(city, stack)
     far = stated(city, moved(city / "dsm.tif", tmp_path / "far.tif", 50_000, 0))
     with pytest.raises(NoOverlapError, match="does not cover"):
-        with_surface_mask(pair, far, stack, context)
+        masked_by(pair, far, stack, context)
 
 
 def test_views_tell_which_image_is_a_radars() -> None:

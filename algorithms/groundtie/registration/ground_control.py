@@ -124,9 +124,8 @@ def match_ground_control(
 
     by = image.orientation
     pair = opened(by, spec)
-    scene = SceneInfo.of(pair.pair, spec.radar)
-    masked = mask_pair(pair, spec, scene, context.part(0.0, 0.1))
-    begun = begin(pair, masked, scene, spec)
+    masked = mask_pair(pair, spec, SceneInfo.of(pair.pair, spec.radar), context.part(0.0, 0.1))
+    begun = begin(pair, masked, spec)
     if begun.verdict.rule:
         return GroundControl(begun, None)
     context.update(0.1, "searching for the coarse shift")
@@ -141,11 +140,10 @@ def match_ground_control(
         spec = replace(spec, search_radius_m=_LEFT_PX * pair.pair.grid.pixel_size_m)
         pair = opened(by, spec)
         if masked.used.image == INPUT:
-            scene = SceneInfo.of(pair.pair, spec.radar)
-            masked = mask_pair(pair, spec, scene, context.quiet())
+            masked = mask_pair(pair, spec, SceneInfo.of(pair.pair, spec.radar), context.quiet())
         else:
             masked = masked.on(pair.pair)
-    registration = register(pair, masked, scene, spec, context.part(0.4, 1.0))
+    registration = register(pair, masked, spec, context.part(0.4, 1.0))
     points = registration.tie_points
     if points is None:
         return GroundControl(registration, None)

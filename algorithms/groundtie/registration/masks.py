@@ -42,6 +42,8 @@ class Masked:
     ----------
     pair
         The images with all masks: what is matched.
+    scene
+        What the images are.
     used
         Which mask was made.
     surface
@@ -49,6 +51,7 @@ class Masked:
     """
 
     pair: ImagePair
+    scene: SceneInfo
     used: MaskUsed
     surface: SurfaceGround | None = None
 
@@ -81,17 +84,19 @@ def with_ground_mask(
         Threads and progress.
     """
     if not scene.is_radar_and_camera:
-        return Masked(pair, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's"))
+        return Masked(
+            pair, scene, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
+        )
     if not scene.is_town:
         reason = f"{_shown(scene)}: too few for a town"
-        return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason))
     if scene.is_town_of_unknown_size:
         reason = f"{_shown(scene)}, as in a town, in pixels of unknown size"
-        return Masked(pair, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason))
     if not scene.shows_ground:
         reason = f"{_shown(scene)}, as in a town, in pixels too large to resolve streets"
         elevated_px = _WHOLE_M / pair.grid.pixel_size_m
-        return Masked(pair, MaskUsed(NONE, None, 1.0, reason, elevated_px=elevated_px))
+        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason, elevated_px=elevated_px))
     return _of_town(pair, scene, stack, context)
 
 
@@ -111,7 +116,7 @@ def ground_instead(
         reason = "what has texture over a wide area is forest or settlement"
         used = MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX)
         is_part = not used.leaves_little and share <= _MOST_OPEN
-        return Masked(image, used) if is_part else None
+        return Masked(image, scene, used) if is_part else None
     if scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground:
         return _of_town(pair, scene, stack, context)
     return None
@@ -124,7 +129,7 @@ def _of_town(pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Conte
     masked, share = with_mask(pair, name, radar, ground.select, stack, context)
     reason = f"{_shown(scene)}, as in a town"
     elevated_px = _OBLIQUE_PX if scene.input.is_in_sensor_geometry else _ON_GROUND_PX
-    return Masked(masked, MaskUsed(GROUND, name, share, reason, elevated_px=elevated_px))
+    return Masked(masked, scene, MaskUsed(GROUND, name, share, reason, elevated_px=elevated_px))
 
 
 def _shown(scene: SceneInfo) -> str:

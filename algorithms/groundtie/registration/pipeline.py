@@ -51,66 +51,67 @@ def run(
         scene = scene or SceneInfo.of(opened.pair, spec.radar)
         context.update(0.02, "inspecting the images")
         masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
-        return register(opened, masked, scene, spec, context.part(0.12, 1.0))
+        return register(opened, masked, spec, context.part(0.12, 1.0))
 
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
     """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
     if spec.surface is not None:
-        return with_surface_mask(opened.pair, spec.surface, opened.stack, context)
+        return with_surface_mask(opened.pair, scene, spec.surface, opened.stack, context)
     if opened.user_mask is not None:
-        return Masked(opened.pair, opened.user_mask)
+        return Masked(opened.pair, scene, opened.user_mask)
     if spec.surface_view is not None:
         reason = "the surface model is rendered with the layover of the radar image"
-        return Masked(opened.pair, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(opened.pair, scene, MaskUsed(NONE, None, 1.0, reason))
     return with_ground_mask(opened.pair, scene, opened.stack, context)
 
 
-def begin(opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification) -> Registration:
+def begin(opened: OpenPair, masked: Masked, spec: Specification) -> Registration:
     """Return a registration of which only the images are judged: refused by them, or by no rule."""
-    verdict = decide(ImagesEvidence(scene, masked.used), "")
+    scene, used = masked.scene, masked.used
+    verdict = decide(ImagesEvidence(scene, used), "")
     if verdict.accepted:
         verdict = NOT_JUDGED
-    return Registration(masked.pair, spec, scene, masked.used, verdict, started=opened.started)
+    return Registration(masked.pair, spec, scene, used, verdict, started=opened.started)
 
 
 def register(
-    opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
+    opened: OpenPair, masked: Masked, spec: Specification, context: Context
 ) -> Registration:
     """Register a pair whose masks and facts are found; parameters as `run` and its stages.
 
     What is refused as a whole, as elevated objects may cause, is tried again by the ground of a
     radar image.
     """
-    found = _register_once(opened, masked, scene, spec, context)
+    found = _register_once(opened, masked, spec, context)
     is_whole = masked.used.kind == NONE and not spec.is_rendered
     if found.verdict.is_final or not is_whole:
         return found
-    ground = ground_instead(opened.pair, scene, opened.stack, context)
+    ground = ground_instead(opened.pair, masked.scene, opened.stack, context)
     if ground is None:
         return found
     spec = replace(spec, tries=spec.tries + 1)
-    again = _register_once(opened, ground, scene, spec, context.quiet())
+    again = _register_once(opened, ground, spec, context.quiet())
     return again if again.verdict.accepted else replace(found, spec=spec)
 
 
 def _register_once(
-    opened: OpenPair, masked: Masked, scene: SceneInfo, spec: Specification, context: Context
+    opened: OpenPair, masked: Masked, spec: Specification, context: Context
 ) -> Registration:
-    result = begin(opened, masked, scene, spec)
+    result = begin(opened, masked, spec)
     if result.verdict.rule:
         return result
     stages = Stages.of(opened.images, masked, spec)
     try:
         estimate, check = stages.checked(context.part(0.0, 0.9))
-        evidence, verdict = judge_estimate(stages, estimate, check, scene, context.part(0.9, 1.0))
+        evidence, verdict = judge_estimate(stages, estimate, check, context.part(0.9, 1.0))
     except (NothingFoundError, TooFewPointsError) as error:
         return replace(result, verdict=judge_search(error))
     return replace(result, verdict=verdict, check=check, evidence=evidence)
 
 
 def judge_estimate(
-    stages: Stages, estimate: Estimate, check: Check, scene: SceneInfo, context: Context
+    stages: Stages, estimate: Estimate, check: Check, context: Context
 ) -> tuple[RegistrationEvidence, Verdict]:
     """Return the evidence and the verdict on an estimate, wherever it comes from.
 
@@ -120,8 +121,6 @@ def judge_estimate(
         Of the pair.
     estimate, check
         The model, and the check points around it.
-    scene
-        What the images are.
     context
         Threads and progress.
 
@@ -130,18 +129,15 @@ def judge_estimate(
     TooFewPointsError
         A mask leaves too few pixels to match.
     """
-    surveys = stages.survey(estimate, scene, context)
-    evidence = stages.evidence(estimate, check, surveys, scene)
+    evidence = stages.evidence(estimate, check, stages.survey(estimate, context))
     verdict = judge(evidence)
-    if verdict.accepted and _asks_for_exchange(evidence, scene, stages.spec):
+    if verdict.accepted and _asks_for_exchange(evidence, stages.spec):
         evidence = replace(evidence, exchanged=_exchanged(stages, evidence, context.quiet()))
         verdict = judge(evidence)
     return evidence, verdict
 
 
-def _asks_for_exchange(
-    evidence: RegistrationEvidence, scene: SceneInfo, spec: Specification
-) -> bool:
+def _asks_for_exchange(evidence: RegistrationEvidence, spec: Specification) -> bool:
     """Whether so few check points confirm a transform that those of the exchanged pair must, too.
 
     What is rendered, or located by a sensor model, is no reference for another image.
@@ -149,7 +145,7 @@ def _asks_for_exchange(
     if not evidence.needs_second_confirmation or evidence.mask.is_ground:
         return False
     is_plain = spec.surface is None and spec.dem is None and not spec.is_rendered
-    return is_plain and not scene.input.is_in_sensor_geometry
+    return is_plain and not evidence.scene.input.is_in_sensor_geometry
 
 
 def _exchanged(stages: Stages, evidence: RegistrationEvidence, context: Context) -> Agreement:

@@ -32,7 +32,6 @@ from .evidence import RegistrationEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
 from .masks import Masked
 from .opening import open_terrain
-from .scene import SceneInfo
 from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
@@ -121,7 +120,7 @@ class Stages:
         """Match the check chips around what a model on the map predicts."""
         return check_model(self.matcher, self.held_out.layout, model, context)
 
-    def survey(self, estimate: Estimate, scene: SceneInfo, context: Context) -> Surveys:
+    def survey(self, estimate: Estimate, context: Context) -> Surveys:
         """Match chips all over the pair, with what its masks leave, around what was estimated."""
         if self.spec.is_placed:
             return Surveys()
@@ -131,19 +130,14 @@ class Stages:
             estimate.transform,
             survey_places(chips.pair.grid),
             (ELSEWHERE_PX, EXACT_PX),
-            scene.sensors,
-            scene.open_ground if self.masked.used.kind == NONE else None,
+            self.masked.scene.sensors,
+            self.masked.scene.open_ground if self.masked.used.kind == NONE else None,
             context,
         )
 
-    def evidence(
-        self,
-        estimate: Estimate,
-        check: Check,
-        surveys: Surveys,
-        scene: SceneInfo,
-    ) -> RegistrationEvidence:
+    def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
         """Return what the rules look at."""
+        scene = self.masked.scene
         is_radar = self.spec.radar == BOTH or scene.are_both_radar
         factor = (
             KEYPOINTS_MEAN_OVER_SCATTER

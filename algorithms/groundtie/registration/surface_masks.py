@@ -24,7 +24,7 @@ from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage, Window, open_raster
 from .masks import Masked
-from .scene import scene_of
+from .scene import SceneInfo, scene_of
 from .specification import StatedSurface
 from .user_masks import UserMask, with_mask
 
@@ -51,7 +51,7 @@ _DARKEST = np.float32(0.01)
 
 
 def with_surface_mask(
-    pair: ImagePair, stated: StatedSurface, stack: ExitStack, context: Context
+    pair: ImagePair, scene: SceneInfo, stated: StatedSurface, stack: ExitStack, context: Context
 ) -> Masked:
     """Return a pair with a mask of the ground that both images show.
 
@@ -59,6 +59,8 @@ def with_surface_mask(
     ----------
     pair
         The images, with the masks that the user gave.
+    scene
+        What the images are.
     stated
         The surface model and the views.
     stack
@@ -76,7 +78,7 @@ def with_surface_mask(
     reason = f"ground that both images show by {stated.name}{fit.note if fit else ''}"
     is_reliable = fit is None or fit.is_clear
     used = MaskUsed(SURFACE, REFERENCE, share, reason, is_reliable, _ON_MODELLED_GROUND_PX)
-    return Masked(masked, used, surface=ground)
+    return Masked(masked, scene, used, ground)
 
 
 def fitted_ground(
