@@ -48,7 +48,7 @@ def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
             info = SceneInfo.of(pair, declared)
             assert info.is_radar_and_camera and info.radar_name == declared
             assert info.may_be_town == is_town
-            assert info.radar is info.of_name(declared) and info.other is not info.radar
+            assert info.radar is getattr(info, declared) and info.other is not info.radar
         assert not SceneInfo.of(pair).is_radar_and_camera
         # Two images of a camera's hide no radar's.
         assert not SceneInfo.of(pair, "neither").may_be_town

@@ -103,9 +103,11 @@ def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specifica
 
 def searched(preset: Specification, given: Mapping[str, Any], image: str) -> Specification:
     """Return a preset with the limits and the surface model that a tool was given."""
-    surface = asked_surface(given, image)
+    surface, radar = asked_surface(given, image), preset.radar
     return replace(
-        preset if surface is None else preset.with_surface(surface),
+        preset,
+        surface=surface,
+        radar=surface.radar if surface is not None and radar == AUTO else radar,
         max_error_px=given["max_error"],
         search_radius_m=given["search_radius"],
         matching_pixel_size_m=given["matching_pixel_size"],

@@ -114,10 +114,6 @@ class SceneInfo:
         )
         return cls(reference, input, declared, pair.is_ground_masked)
 
-    def of_name(self, name: str) -> ImageFacts:
-        """Return what the "reference" or the "input" is."""
-        return self.reference if name == REFERENCE else self.input
-
     @cached_property
     def radar_name(self) -> str:
         """Which image is rather a radar's, "reference" or "input": by metadata, else by speckle."""
@@ -130,12 +126,12 @@ class SceneInfo:
     @property
     def radar(self) -> ImageFacts:
         """The image that is rather a radar's."""
-        return self.of_name(self.radar_name)
+        return self.reference if self.radar_name == REFERENCE else self.input
 
     @property
     def other(self) -> ImageFacts:
         """The other image."""
-        return self.of_name(INPUT if self.radar_name == REFERENCE else REFERENCE)
+        return self.input if self.radar_name == REFERENCE else self.reference
 
     @cached_property
     def is_radar_and_camera(self) -> bool:

@@ -160,11 +160,6 @@ class Specification:
         """`max_error_px` in matching pixels."""
         return self.max_error_px / self.enlargement
 
-    def with_surface(self, surface: StatedSurface) -> Specification:
-        """Return the same with elevated objects, and whose images show them."""
-        radar = surface.radar if self.radar == AUTO else self.radar
-        return replace(self, surface=surface, radar=radar)
-
 
 # What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any
 # rotation, optical ones another scale besides, and lie a quarter of their side off.
