@@ -49,6 +49,7 @@ from groundtie.registration import evidence as stages
 from groundtie.registration import rules
 from groundtie.registration.evidence import (
     Agreement,
+    DateEvidence,
     ImagesEvidence,
     RegistrationEvidence,
     SearchEvidence,
@@ -56,7 +57,6 @@ from groundtie.registration.evidence import (
 from groundtie.registration.pose_verdict import PoseEvidence, PoseSurveyEvidence
 from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.rules import RULES, Rule
-from groundtie.registration.series_evidence import DateEvidence
 from groundtie.registration.tie_point_evidence import TiePointEvidence
 from groundtie.registration.verdict import refusals
 

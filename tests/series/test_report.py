@@ -19,7 +19,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid, reproject
 from groundtie.rasters.pair import Image
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.series_evidence import DateEvidence
+from groundtie.registration.evidence import DateEvidence
 from groundtie.series.closure import Closure
 from groundtie.series.dates import Date
 from groundtie.series.inputs import Listed

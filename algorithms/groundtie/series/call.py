@@ -18,8 +18,8 @@ from ..geometry.transform import Transform
 from ..progress import Progress
 from ..raster_names import identity
 from ..rasters.reading import bounded_cache
+from ..registration.evidence import DateEvidence
 from ..registration.registered_output import model_for_grid
-from ..registration.series_evidence import DateEvidence
 from ..registration.user_masks import UserMask
 from .dates import Date, footprint_shares, open_dates
 from .delivery import SeriesFiles

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..registration.series_evidence import DateEvidence
+from ..registration.evidence import DateEvidence
 from ..registration.verdict import Verdict, decide
 from .closure import Closure, triplet_closures
 from .frame import FloatArray, SeriesFrame

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..series_evidence import DateEvidence
+from ..evidence import DateEvidence
 from .rule import Rule
 
 
