@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 from textured_pairs import TexturedPair, listing
 
-from groundtie.errors import NothingFoundError, NotRegisteredError
+from groundtie.errors import (
+    NothingFoundError,
+    NotRegisteredError,
+    OutputError,
+    ParameterError,
+    SameFileError,
+)
 from groundtie.matching.check import CHECK_RADIUS_PX, Check
 from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
@@ -104,6 +110,60 @@ def test_what_is_warped_beyond_the_overlap_is_stated(
     assert (beyond is not None) == (grid == "input")
     if beyond is not None:
         assert beyond.share == pytest.approx(0.5, abs=0.1)
+
+
+class TestWhatIsWrittenOverNothing:
+    """Outputs of `warp` and `report` are checked as those of tools are."""
+
+    @pytest.mark.parametrize("role", ["input", "reference"])
+    def test_neither_over_an_image(
+        self, registration: Registration, tmp_path: Path, role: str
+    ) -> None:
+        image = Path(getattr(registration.pair, role).source.path)
+        before = image.read_bytes()
+        (tmp_path / "link.tif").symlink_to(image)
+        for path in (image, tmp_path / "link.tif"):
+            with pytest.raises(SameFileError, match=f"output is the same file as (raster|{role})"):
+                registration.warp(output=path)
+        assert image.read_bytes() == before
+
+    def test_nor_over_the_raster_that_is_warped(
+        self, registration: Registration, textured: TexturedPair, tmp_path: Path
+    ) -> None:
+        other = tmp_path / "other.tif"
+        other.write_bytes(textured.input.read_bytes())
+        with pytest.raises(SameFileError, match="output is the same file as raster"):
+            registration.warp(other, other)
+        assert other.read_bytes() == textured.input.read_bytes()
+
+    def test_nor_over_what_else_the_registration_was_called_with(
+        self, registration: Registration, tmp_path: Path
+    ) -> None:
+        mask, output = tmp_path / "mask.tif", tmp_path / "o.tif"
+        mask.touch()
+        called = {"input_mask": mask, "output": output}
+        found = replace(registration, parameters=called, files={"output": output})
+        with pytest.raises(SameFileError, match="output is the same file as input_mask"):
+            found.warp(output=mask)
+        found.warp(output=output)
+        assert mask.read_bytes() == b""
+
+    @pytest.mark.parametrize("name", ["o.png", "o", "o.html"])
+    def test_rasters_have_the_suffix_of_one(
+        self, registration: Registration, tmp_path: Path, name: str
+    ) -> None:
+        with pytest.raises(ParameterError, match=r"output must end in \.tif or \.tiff or \.vrt"):
+            registration.warp(output=tmp_path / name)
+        assert listing(tmp_path) == {}
+
+    def test_reports_are_pages(self, registration: Registration, tmp_path: Path) -> None:
+        (tmp_path / "dsm.tif").write_bytes(b"heights")
+        with pytest.raises(ParameterError, match=r"report must end in \.html"):
+            registration.report(tmp_path / "dsm.tif")
+        (tmp_path / "r.json").write_text('{"type": "Feature"}')
+        with pytest.raises(OutputError, match=r"would also write .*r\.json"):
+            registration.report(tmp_path / "r.html")
+        assert (tmp_path / "dsm.tif").read_bytes() == b"heights"
 
 
 def test_what_was_tried_before_stands_after_the_correction(registration: Registration) -> None:

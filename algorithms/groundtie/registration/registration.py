@@ -13,18 +13,21 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Raster
+from ..call_paths import check_paths
 from ..context import threads
 from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
+from ..kinds import GEOTIFF, FileOut, RasterIn, RasterOut, WrittenKind
 from ..masks.used import MaskUsed
 from ..matching.check import Check
 from ..raster_names import file_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
-from ..rasters.reading import open_raster
+from ..rasters.reading import RasterSource, open_raster
+from ..rasters.vrt import SUFFIX as VRT
 from ..report.correction import Correction
 from ..report.details import extremes
 from ..report.report import Report
@@ -40,6 +43,11 @@ _LOG = logging.getLogger(__name__)
 
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
+
+# What is written outside of a tool's call, and is checked as its outputs are.
+_READ = RasterIn(help="A raster that is read.")
+_WARPED = RasterOut(help="The registered raster.", suffixes=(*GEOTIFF, VRT))
+_REPORT = FileOut(help="An HTML page.", suffixes=(".html",), numbers=True)
 
 
 @dataclass(frozen=True)
@@ -156,7 +164,14 @@ class Registration:
         ------
         GeoreferencingError, NoOverlapError
             The raster lies elsewhere than the input.
+        ParameterError
+            The output is no name of a raster that can be written.
+        SameFileError
+            The output is the raster, or was read by the registration.
+        OutputError
+            The output cannot be written.
         """
+        path = None if output is None else _WARPED.check("output", output)
         transform = self.accepted()
         reference = self.pair.reference.source.grid
         with threads(workers) as context, ExitStack() as stack:
@@ -164,7 +179,8 @@ class Registration:
             if raster is not None:
                 source = stack.enter_context(open_raster(raster))
                 transform = transform_of(transform, source, "the registration")
-            path = None if output is None else Path(output)
+            if path is not None:
+                self._check_written("output", _WARPED, path, source)
             beyond = self.beyond_overlap(grid_of_output(path, grid), transform)
             if beyond is not None:
                 _LOG.warning(beyond.line())
@@ -196,12 +212,32 @@ class Registration:
 
         Raises
         ------
+        ParameterError
+            The path does not end in `.html`.
         OutputError
             A file cannot be written.
         """
-        html = Path(path)
+        html = _REPORT.check("report", path)
+        self._check_written("report", _REPORT, html)
         with Outputs() as outputs:
             self.page().write(outputs, html)
+
+    def _check_written(
+        self, name: str, kind: WrittenKind, path: Path, warped: RasterSource | None = None
+    ) -> None:
+        """Raise `SameFileError` or `OutputError` if a file would be written over what is read.
+
+        That is what is warped, the images, and what else the registration was called with.
+        """
+        read: dict[str, Any] = {
+            parameter: value
+            for parameter, value in self.parameters.items()
+            if isinstance(value, Path) and value not in self.files.values()
+        }
+        images = {"reference": self.pair.reference.source, "input": self.pair.input.source}
+        images |= {} if warped is None else {"raster": warped}
+        read |= {role: source.path for role, source in images.items()}
+        check_paths([*((other, _READ, value) for other, value in read.items()), (name, kind, path)])
 
     def page(self) -> Report:
         """Return the report."""
