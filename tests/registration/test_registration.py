@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -164,6 +165,32 @@ class TestWhatIsWrittenOverNothing:
         with pytest.raises(OutputError, match=r"would also write .*r\.json"):
             registration.report(tmp_path / "r.html")
         assert (tmp_path / "dsm.tif").read_bytes() == b"heights"
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"grid": "foo"}, "grid must be one of reference, input, untouched, not 'foo'"),
+        ({"grid": "untouched"}, "the grid untouched needs an output"),
+        ({"resampling": "foo"}, "resampling must be one of nearest, .*, not 'foo'"),
+        ({"workers": -1}, "workers must be 1 to 256, not -1"),
+        ({"workers": "x"}, "workers must be a number, not 'x'"),
+    ],
+)
+def test_words_and_numbers_that_mean_nothing(
+    registration: Registration, tmp_path: Path, asked: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
+        registration.warp(**asked)
+    if asked != {"grid": "untouched"}:
+        with pytest.raises(ParameterError, match=message):
+            registration.warp(output=tmp_path / "o.tif", **asked)
+    assert listing(tmp_path) == {}
+
+
+def test_a_grid_that_is_none_has_nothing_beyond(registration: Registration) -> None:
+    with pytest.raises(ParameterError, match="grid must be one of"):
+        registration.beyond_overlap("foo")
 
 
 def test_what_was_tried_before_stands_after_the_correction(registration: Registration) -> None:

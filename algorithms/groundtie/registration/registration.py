@@ -16,10 +16,10 @@ from ..arrays import Raster
 from ..call_paths import check_paths
 from ..context import threads
 from ..declaration import file_lines, given_files
-from ..errors import NotRegisteredError
+from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..kinds import GEOTIFF, FileOut, RasterIn, RasterOut, WrittenKind
+from ..kinds import GEOTIFF, Choice, FileOut, Number, RasterIn, RasterOut, WrittenKind
 from ..masks.used import MaskUsed
 from ..matching.check import Check
 from ..raster_names import file_name
@@ -28,12 +28,20 @@ from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
 from ..rasters.reading import RasterSource, open_raster
 from ..rasters.vrt import SUFFIX as VRT
+from ..rasters.warping import METHODS
 from ..report.correction import Correction
 from ..report.details import extremes
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
-from .registered_output import BeyondOverlap, RegisteredOutput, grid_of_output, resampled_onto
+from .registered_output import (
+    OUTPUT_GRIDS,
+    UNTOUCHED,
+    BeyondOverlap,
+    RegisteredOutput,
+    grid_of_output,
+    resampled_onto,
+)
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
@@ -44,10 +52,13 @@ _LOG = logging.getLogger(__name__)
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
 
-# What is written outside of a tool's call, and is checked as its outputs are.
+# What is asked for outside of a tool's call, and is checked as its parameters are.
 _READ = RasterIn(help="A raster that is read.")
 _WARPED = RasterOut(help="The registered raster.", suffixes=(*GEOTIFF, VRT))
 _REPORT = FileOut(help="An HTML page.", suffixes=(".html",), numbers=True)
+_GRID = Choice(help="The grid of the registered raster.", choices=OUTPUT_GRIDS)
+_RESAMPLING = Choice(help="How pixels are interpolated.", choices=METHODS)
+_WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=256)
 
 
 @dataclass(frozen=True)
@@ -165,16 +176,21 @@ class Registration:
         GeoreferencingError, NoOverlapError
             The raster lies elsewhere than the input.
         ParameterError
-            The output is no name of a raster that can be written.
+            There is no such grid, resampling or number of threads; the output is no name of a
+            raster that can be written, or pixels without an output are to stay untouched.
         SameFileError
             The output is the raster, or was read by the registration.
         OutputError
             The output cannot be written.
         """
         path = None if output is None else _WARPED.check("output", output)
+        grid, resampling = _GRID.check("grid", grid), _RESAMPLING.check("resampling", resampling)
+        threads_used = None if workers is None else int(_WORKERS.check("workers", workers))
+        if path is None and grid == UNTOUCHED:
+            raise ParameterError(f"the grid {UNTOUCHED} needs an output")
         transform = self.accepted()
         reference = self.pair.reference.source.grid
-        with threads(workers) as context, ExitStack() as stack:
+        with threads(threads_used) as context, ExitStack() as stack:
             source = self.pair.input.source
             if raster is not None:
                 source = stack.enter_context(open_raster(raster))
@@ -203,7 +219,13 @@ class Registration:
             One of `registered_output.OUTPUT_GRIDS`.
         transform
             That of the raster; None: of the input.
+
+        Raises
+        ------
+        ParameterError
+            There is no such grid.
         """
+        grid = _GRID.check("grid", grid)
         assert self.evidence is not None
         return BeyondOverlap.of(grid, transform or self.accepted(), self.evidence.grid.covers)
 
