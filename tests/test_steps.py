@@ -100,6 +100,13 @@ class TestFit:
         with pytest.raises(ParameterError, match=r"one of translation, .*, not 'rubb'"):
             steps.fit_model("rubb", np.zeros((9, 2)), np.zeros((9, 2)))
 
+    def test_positions_that_are_no_pairs(self) -> None:
+        xy, _, found = self.made("affine", 0)
+        with pytest.raises(ParameterError, match=r"the shape \(\.\.\., 2\), not \(2, 60\)"):
+            steps.fit_model("affine", xy.T, found.T)
+        with pytest.raises(ParameterError, match=r"60 positions .*, but 59 in the input"):
+            steps.fit_model("affine", xy, found[1:])
+
 
 class TestFromImagesToVerdict:
     """Match, fit and judge, without files."""

@@ -23,7 +23,7 @@ from .geometry.estimation import Estimate, fit_without_blocks
 from .geometry.models import DEGREE, KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
-from .geometry.transform import Transform
+from .geometry.transform import Transform, as_positions
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
@@ -175,13 +175,17 @@ def fit_model(
     Raises
     ------
     ParameterError
-        There is no such kind of model.
+        There is no such kind of model, or the positions are no pairs.
     TooFewPointsError
         Too few pairs agree with a model of this kind.
     """
     if kind not in KINDS:
         raise ParameterError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
-    px, nominal_px = (np.asarray(p, float).reshape(-1, 2) / pixel_size for p in (xy, nominal_xy))
+    px, nominal_px = (as_positions(p).reshape(-1, 2) / pixel_size for p in (xy, nominal_xy))
+    if len(px) != len(nominal_px):
+        raise ParameterError(
+            f"{len(px)} positions in the reference, but {len(nominal_px)} in the input"
+        )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
     first = kind if DEGREE.get(kind, 2) <= 1 else "affine"

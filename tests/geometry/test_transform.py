@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.errors import TransformFileError
+from groundtie.errors import ParameterError, TransformFileError
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import KINDS
 from groundtie.geometry.tie_points import TiePoints
@@ -64,6 +64,15 @@ def test_positions_come_in_arrays_of_any_shape(kind: str) -> None:
         np.testing.assert_array_equal(found.reshape(-1, 2), function(positions.reshape(-1, 2)))
         np.testing.assert_allclose(function(list(positions[1, 2])), found[1, 2], rtol=1e-9)
         assert function(positions[:0]).shape == (0, 5, 2)
+
+
+@pytest.mark.parametrize("shape", [(2, 4), (2, 3), (4,), (5, 3), ()])
+def test_positions_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
+    """Of (2, 4), all x before all y, other positions would be made."""
+    transform = misregistered("affine", UTM, GRID)
+    for function in (transform, transform.inverse, transform.nominal_xy):
+        with pytest.raises(ParameterError, match=r"must have the shape \(\.\.\., 2\), not "):
+            function(np.ones(shape))
 
 
 def test_an_input_across_the_antimeridian_is_one() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
-from ..errors import TransformFileError
+from ..errors import ParameterError, TransformFileError
 from ..rasters.grid import (
     FloatArray,
     Grid,
@@ -63,8 +63,14 @@ class Transform:
         return cls(shift_model(0.0, 0.0), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
-        """Return the input pixels (col, row), centres at integers, of map positions (..., 2)."""
-        positions = np.asarray(xy, float)
+        """Return the input pixels (col, row), centres at integers, of map positions (..., 2).
+
+        Raises
+        ------
+        ParameterError
+            They are of another shape.
+        """
+        positions = as_positions(xy)
         moved = self.model(positions.reshape(-1, 2))
         nominal = self.input_grid.to_own_map(moved, self.crs)
         return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
@@ -74,8 +80,14 @@ class Transform:
         return lambda xy: self(self._at_model(reproject(xy, crs, self.crs)))
 
     def nominal_xy(self, px: ArrayLike) -> FloatArray:
-        """Return the nominal reference map positions of input pixels (col, row), (..., 2)."""
-        positions = np.asarray(px, float)
+        """Return the nominal reference map positions of input pixels (col, row), (..., 2).
+
+        Raises
+        ------
+        ParameterError
+            They are of another shape.
+        """
+        positions = as_positions(px)
         xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
         return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
@@ -91,7 +103,13 @@ class Transform:
         return np.asarray(((last - first) / size[:, None]).T)
 
     def inverse(self, px: ArrayLike) -> FloatArray:
-        """Return the reference map positions of input pixels (col, row), (..., 2)."""
+        """Return the reference map positions of input pixels (col, row), (..., 2).
+
+        Raises
+        ------
+        ParameterError
+            They are of another shape.
+        """
         nominal = self.nominal_xy(px)
         at_model = self._at_model(nominal.reshape(-1, 2))
         return self.model.inverse(at_model).reshape(nominal.shape)
@@ -150,6 +168,20 @@ class Transform:
             if isinstance(error, TransformFileError):
                 raise
             raise TransformFileError(f"not a transform: {error!r}") from error
+
+
+def as_positions(values: ArrayLike) -> FloatArray:
+    """Return positions as an array, shape (..., 2); of none the shape does not count.
+
+    Raises
+    ------
+    ParameterError
+        The last axis holds something else, as where all x stand before all y.
+    """
+    positions = np.asarray(values, float)
+    if positions.size and positions.shape[-1:] != (2,):
+        raise ParameterError(f"positions must have the shape (..., 2), not {positions.shape}")
+    return positions
 
 
 def load_transform(path: str | Path) -> Transform:
