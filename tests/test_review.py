@@ -155,6 +155,30 @@ def test_too_few_points_leave_the_models_that_they_hold() -> None:
     assert review_of(0).fits() == {}
 
 
+def lying_at(places_px: np.ndarray) -> Review:
+    """Return the points of a shift of (5, -7) px at these pixels of the reference."""
+    review = review_of(len(places_px))
+    for index, place in enumerate(places_px):
+        review = review.move(index, GRID.pixel_to_map(place), place + [5.0, -7.0])
+    return review
+
+
+@pytest.mark.parametrize("along", [(1.0, 0.0), (0.3, 0.7), (1.0, -1.0)])
+def test_points_on_a_line_hold_no_spline(along: tuple[float, float]) -> None:
+    fits = lying_at(100 + np.outer(np.arange(0.0, 240.0, 20.0), along)).fits()
+    assert "tps" not in fits
+    assert fits["similarity"].residuals_px.max() < 1e-6
+
+
+@pytest.mark.parametrize("count", [2, 5])
+@pytest.mark.filterwarnings("error")
+def test_points_at_one_place_hold_a_shift_alone(count: int) -> None:
+    fits = lying_at(np.full((count, 2), 100.0)).fits()
+    assert fits["translation"].residuals_px.max() < 1e-6
+    assert not {"rigid", "similarity", "tps"} & set(fits)
+    assert all(np.isfinite(fit.residuals_px).all() for fit in fits.values())
+
+
 def test_points_at_one_place_are_objected_to() -> None:
     review = review_of(6)
     for index in range(6):

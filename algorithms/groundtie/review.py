@@ -181,9 +181,11 @@ class Review:
             if kind == "tps" and self.points.fit.sum() > MOST_SPLINE_POINTS:
                 continue
             try:
-                found[kind] = self.fit(kind)
+                fit = self.fit(kind)
             except TooFewPointsError:
                 continue
+            if np.isfinite(fit.residuals_px).any():  # not of points at one place
+                found[kind] = fit
         return found
 
     def worst(self, residuals_px: FloatArray) -> NDArray[np.int_]:

@@ -21,6 +21,9 @@ from .models import (
 # frame units. A knot a tenth of the scene away then sways a point's neighbourhood, not a pixel.
 TPS_STIFFNESS = 1e-2
 
+# Singular values below this share of the largest are rounding errors.
+_ROUNDING = 1e-9
+
 
 def fit_model(
     kind: str,
@@ -45,7 +48,7 @@ def fit_model(
     Raises
     ------
     TooFewPointsError
-        Fewer pairs with a weight than half the model's parameters.
+        Fewer pairs with a weight than half the model's parameters; or a spline's lie on a line.
     """
     weights = np.ones(len(xy)) if weights is None else weights
     taken = weights > 0
@@ -79,7 +82,8 @@ def _fit_similarity(
     z = (uv - centre) @ [1, 1j]
     nominal_z = (nominal_uv - nominal_centre) @ [1, 1j]
     turn = np.sum(weights * nominal_z * z.conj())
-    turn = turn / np.sum(weights * np.abs(z) ** 2) if scaled else turn / np.abs(turn)
+    with np.errstate(invalid="ignore"):  # points at one place have no direction: NaN
+        turn = turn / np.sum(weights * np.abs(z) ** 2) if scaled else turn / np.abs(turn)
     linear = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
     return np.vstack([nominal_centre - centre @ linear, linear - np.eye(2)])
 
@@ -90,6 +94,9 @@ def _fit_thin_plate(
     """Smoothing thin-plate spline ([Wahba1990]): residuals weigh against bending."""
     count = len(uv)
     affine_part = monomials(uv, 1)
+    sizes = np.linalg.svd(affine_part, compute_uv=False)
+    if sizes[-1] <= _ROUNDING * sizes[0]:
+        raise TooFewPointsError("the tps model needs points that do not all lie on a line")
     stiffness = TPS_STIFFNESS * weights.mean() / weights
     system = np.zeros((count + 3, count + 3))
     system[:count, :count] = thin_plate_kernel(uv, uv) + np.diag(stiffness)
