@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Raster:
     Raises
     ------
     ParameterError
-        The values are no image of numbers, or the transform or CRS is none.
+        The values are no image of numbers, the transform or CRS is none, or nodata no number.
     GeoreferencingError
         A CRS without a transform.
     """
@@ -60,6 +61,7 @@ class Raster:
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", _pixels(self.values))
         object.__setattr__(self, "crs", _crs(self.crs))
+        object.__setattr__(self, "nodata", _nodata(self.nodata))
         if self.transform is None and self.crs is not None:
             raise GeoreferencingError("an array with a CRS needs its transform, too")
         if self.transform is not None and not isinstance(self.transform, Affine):
@@ -225,3 +227,10 @@ def _crs(crs: Any) -> CRS | None:
         return None if crs is None else CRS.from_user_input(crs)
     except (CRSError, TypeError, ValueError) as error:
         raise ParameterError(f"no coordinate reference system: {crs!r}") from error
+
+
+def _nodata(nodata: Any) -> Any:
+    if nodata is not None and not isinstance(nodata, Real):
+        raise ParameterError(f"nodata must be a number, not {nodata!r}")
+    # Not as a float, which would round large whole numbers.
+    return nodata

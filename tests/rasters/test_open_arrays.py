@@ -21,6 +21,7 @@ from groundtie.errors import BandError, ParameterError, RasterOpenError, SameFil
 from groundtie.rasters.grid import PIXEL_COORDINATES
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import Window, open_raster
+from groundtie.rasters.writing import require_fit
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(60, 40)
@@ -54,6 +55,21 @@ def test_an_array_is_read_as_a_file_of_it(tmp_path: Path, dtype: str, nodata: in
     values = image(dtype)
     path = write_raster(tmp_path / "a.tif", values, GRID, nodata=nodata)
     assert_read_alike(Raster(values, GRID.transform, UTM, nodata), path)
+
+
+@pytest.mark.parametrize("nodata", [np.inf, -np.inf, np.nan])
+def test_no_integer_is_infinite_or_nan(nodata: float) -> None:
+    """Such a nodata value, as files of other programs state it, marks no pixel."""
+    with open_raster(Raster(np.zeros((2, 3), np.uint8), nodata=nodata)) as source:
+        assert source.read(source.window)[1].all()
+        with pytest.raises(ParameterError, match="type uint8 cannot hold the nodata value"):
+            require_fit(nodata, source.dtype)
+
+
+@pytest.mark.parametrize("nodata", [7, 7.0, np.uint16(7), np.float32(7)])
+def test_nodata_is_any_number(nodata: Any) -> None:
+    with open_raster(Raster(np.array([[6, 7]], np.uint16), nodata=nodata)) as source:
+        np.testing.assert_array_equal(source.read(source.window)[1], [[True, False]])
 
 
 def test_a_masked_array_is_read_as_a_file_with_a_mask(tmp_path: Path) -> None:
@@ -171,6 +187,8 @@ class TestRaster:
                 "no coordinate reference system: 'EPSG:no'",
             ),
             (np.zeros((2, 3)), {"crs": UTM}, "an array with a CRS needs its transform"),
+            (np.zeros((2, 3)), {"nodata": "x"}, "nodata must be a number, not 'x'"),
+            (np.zeros((2, 3)), {"nodata": [0]}, r"nodata must be a number, not \[0\]"),
         ],
     )
     def test_what_is_no_raster(self, values: Any, place: dict[str, Any], message: str) -> None:

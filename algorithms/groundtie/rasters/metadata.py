@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -125,6 +126,8 @@ def fits(value: float, dtype: np.dtype[Any]) -> bool:
     """Return whether `dtype` can hold `value`."""
     if dtype.kind in "fc":
         return True
+    if not math.isfinite(value):
+        return False
     limits = np.iinfo(dtype)
     return bool(value == int(value) and limits.min <= value <= limits.max)
 
