@@ -238,6 +238,23 @@ def test_clicks_at_different_places_are_not_refined(tmp_path: Path) -> None:
     assert lost == 3
 
 
+@pytest.mark.parametrize("value", [1, 90, 200])
+def test_a_click_on_constant_ground_is_refused(tmp_path: Path, value: int) -> None:
+    """As on a calm lake, a little larger than what is compared: no place there is like another."""
+    write_pair(tmp_path, 0)
+    with rasterio.open(tmp_path / "reference.tif", "r+") as raster:
+        image = raster.read()
+        image[:, 170:230, 170:230] = value
+        raster.write(image)
+    with rasterio.open(tmp_path / "input.tif") as source:
+        grid = Grid(source.transform, source.crs, source.width, source.height)
+    nominal = Transform(shift_model(0.0, 0.0), CRS_33, grid)
+    xy = np.array(ORIGIN) + [200.0, -200.0]
+    names = tmp_path / "reference.tif", tmp_path / "input.tif"
+    with pytest.raises(NothingFoundError, match="do not match: click again"):
+        refine_click(*names, xy, true_input_px(xy), nominal)
+
+
 @pytest.mark.slow
 def test_control_of_an_image_with_rpcs_is_reviewed_alike(tmp_path: Path) -> None:
     """Points by the exact RPCs; the image's own are 8 px off, and a moved point is marked."""

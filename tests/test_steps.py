@@ -15,6 +15,7 @@ from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.similarity.surface import SIMILARITIES
 
 SIZE = 384
 MARGIN = 20
@@ -56,6 +57,27 @@ class TestSurface:
         np.testing.assert_array_equal(*found)
         assert np.abs(found[0] - expected).max() > 0.1
         np.testing.assert_allclose(steps.find_peak(found[0]).shift_px, SHIFT, atol=0.3)
+
+    @pytest.mark.parametrize("value", [0.0, 7.3])
+    @pytest.mark.parametrize("similarity", SIMILARITIES)
+    def test_what_is_constant_is_like_nothing(self, value: float, similarity: str) -> None:
+        image, constant = pair()[1][:120, :140], np.full((120, 140), value)
+        framed = np.pad(constant[18:-18, 18:-18], 18, constant_values=value + 9)
+        for windows in ((constant, image), (image, constant), (framed, image)):
+            surface = steps.similarity_surface(*windows, 10, similarity)
+            assert surface.shape == (21, 21) and not surface.any()
+
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"radius_px": -2}, "radius_px must be at least 0 px, not -2"),
+            ({"radius_px": 2.5}, "radius_px must be a whole number"),
+            ({"radius_px": 10, "similarity": "foo"}, "similarity must be one of fused, "),
+        ],
+    )
+    def test_what_is_no_radius_or_similarity(self, asked: dict[str, Any], message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            steps.similarity_surface(*pair(), **asked)
 
     @pytest.mark.parametrize(
         ("shapes", "message"),

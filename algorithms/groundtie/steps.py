@@ -24,6 +24,7 @@ from .geometry.models import DEGREE, KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform, as_positions
+from .kinds import Choice, Number
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .rasters.patch import Patch
 from .rasters.reading import bounded_cache, open_raster
@@ -35,7 +36,7 @@ from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
 from .similarity.description import BORDER_PX
 from .similarity.peak import Peak, find_peak
-from .similarity.surface import SimilaritySettings, Surface, describe
+from .similarity.surface import SIMILARITIES, SimilaritySettings, Surface, describe
 from .similarity.surface import similarity_surface as surface_of
 
 __all__ = [
@@ -51,6 +52,9 @@ __all__ = [
 
 # Matches are taken to be as exact as this, in pixels, where no better value is given.
 _USUAL_SIGMA_PX = 0.25
+
+_RADIUS = Number(label="Radius", help="Largest shift.", unit="px", minimum=0, integer=True)
+_SIMILARITY = Choice(label="Similarity", help="What is compared.", choices=SIMILARITIES)
 
 
 def similarity_surface(
@@ -72,13 +76,16 @@ def similarity_surface(
     Returns
     -------
     Shape (2 `radius_px` + 1, 2 `radius_px` + 1), in robust standard deviations: rows and columns
-    by which the input's content lies further down and right than the reference's.
+    by which the input's content lies further down and right than the reference's. It is 0 where
+    one of them is constant.
 
     Raises
     ------
     ParameterError
-        The windows are too small, or differ in size.
+        The windows are too small or differ in size, or there is no such radius or similarity.
     """
+    radius_px = int(_RADIUS.check("radius_px", radius_px))
+    similarity = _SIMILARITY.check("similarity", similarity)
     windows = [_patch(image) for image in (reference, input)]
     height, width = windows[0].values.shape
     if windows[1].values.shape != (height, width):
@@ -87,6 +94,10 @@ def similarity_surface(
     if min(chip_pixels) < 1:
         least = 2 * (radius_px + BORDER_PX) + 1
         raise ParameterError(f"windows must have {least} pixels a side for a radius of {radius_px}")
+    compared = windows[0].inner(radius_px + BORDER_PX), windows[1].inner(BORDER_PX)
+    if any(map(_is_constant, compared)):
+        # Its mutual information is nothing but rounding, of which a peak would be made.
+        return np.zeros((2 * radius_px + 1,) * 2, np.float32)
     settings = SimilaritySettings(similarity)
     template, search = (describe(w, chip_pixels[0] * chip_pixels[1], settings) for w in windows)
     return surface_of(template.inner(radius_px), search, radius_px, settings)
@@ -255,6 +266,12 @@ def _stages(
         scene = SceneInfo.of(opened.pair, spec.radar)
         masked = mask_pair(opened, spec, scene, running.quiet())
         yield Stages.of(opened.images, masked, spec), running
+
+
+def _is_constant(window: Patch) -> bool:
+    """Return whether the valid pixels of a window hold one value, if any."""
+    known = window.values[window.valid]
+    return bool((known == known[:1]).all())
 
 
 def _patch(image: ArrayLike) -> Patch:
