@@ -20,6 +20,17 @@ from .strict_json import parse_json
 _DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 _YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
+# ISO 8601, its signs between numbers all there or all left out.
+_MONTH = re.compile(r"\d{4}(-\d\d)?", re.ASCII)
+_TIME = re.compile(
+    r"(?P<year>\d{4})(?P<dash>-?)(?P<month>\d\d)(?P=dash)(?P<day>\d\d)"
+    r"([T ](?P<hour>\d\d)((?P<colon>:?)(?P<minute>\d\d)"
+    r"((?P=colon)(?P<second>\d\d)([.,](?P<fraction>\d+))?)?)?"
+    r"(Z|(?P<sign>[+-])(?P<ahead>[01]\d|2[0-3])(:?(?P<rest>[0-5]\d))?)?)?",
+    re.ASCII | re.IGNORECASE,
+)
+_UNITS = ("year", "month", "day", "hour", "minute", "second")
+
 SUFFIXES = (".json", ".geojson")
 
 # Of files that are rasters, whatever an item states of their type.
@@ -166,20 +177,34 @@ def _is_raster(asset: Mapping[str, Any]) -> bool:
     return is_image or (not kind and Path(file_name(href)).suffix.lower() in RASTER_SUFFIXES)
 
 
-def time_of(text: str) -> datetime.datetime | None:
-    """Return the time that a text states: an ISO 8601 time, else a day or a year in a name."""
+def stated_time(text: str) -> datetime.datetime | None:
+    """Return the time that a text is, in UTC: ISO 8601, down to a year; None: it is none.
+
+    Here and not by Python's own reader, of which each version takes other texts.
+    """
+    text = text.strip()
+    if _MONTH.fullmatch(text):
+        text = f"{text}-01-01"[: len("2020-01-01")]
+    found = _TIME.fullmatch(text)
+    if found is None:
+        return None
+    year, month, day, hour, minute, second = (int(found[unit] or 0) for unit in _UNITS)
+    microsecond = int((found["fraction"] or "0")[:6].ljust(6, "0"))
+    ahead = datetime.timedelta(hours=int(found["ahead"] or 0), minutes=int(found["rest"] or 0))
     try:
-        stated = datetime.datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
-    except ValueError:
-        stated = None
-    if stated is not None and not text.strip().isdigit():
-        if stated.tzinfo is not None:
-            stated = stated.astimezone(datetime.timezone.utc).replace(tzinfo=None)
-        return stated
-    if day := _DAY.search(text):
-        try:
-            return datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
-        except ValueError:  # 30 February
-            return None
-    year = _YEAR.search(text)
-    return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
+        time = datetime.datetime(year, month, day, hour, minute, second, microsecond)
+        return time + ahead if found["sign"] == "-" else time - ahead
+    except (ValueError, OverflowError):  # 30 February, 25:00; before the year 1
+        return None
+
+
+def time_of(name: str) -> datetime.datetime | None:
+    """Return the time that a file's name states: the whole of it, or a day or a year in it."""
+    day = _DAY.search(name)
+    if day is None:
+        year = _YEAR.search(name)
+        return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
+    try:
+        return stated_time(name) or datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
+    except ValueError:  # 30 February
+        return None

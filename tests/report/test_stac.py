@@ -97,6 +97,15 @@ def test_the_time_is_that_of_the_metadata_before_that_of_the_name(tmp_path: Path
     assert found["properties"]["datetime"] == "2023-01-02T03:04:05Z"
 
 
+def test_metadata_that_are_no_time_leave_it_to_the_name(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "s2_20240506.tif", np.ones((20, 30), np.uint8), GRID)
+    with rasterio.open(path, "r+") as dataset:
+        dataset.update_tags(ns="IMAGERY", ACQUISITIONDATETIME="15.06.2020")
+    with open_raster(path) as source:
+        found = stac_item(source, tmp_path / "o.tif", GRID, tmp_path, {})
+    assert found["properties"]["datetime"] == "2024-05-06T00:00:00Z"
+
+
 @pytest.mark.slow
 def test_the_numbers_of_a_report_are_an_item_that_tools_read(
     textured: TexturedPair, tmp_path: Path, context: Context

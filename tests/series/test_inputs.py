@@ -12,6 +12,7 @@ import pytest
 from groundtie.errors import ParameterError
 from groundtie.registration.user_masks import UserMask
 from groundtie.series.inputs import list_dates, time_of
+from groundtie.stac_items import stated_time
 
 DAY = datetime.datetime(2020, 3, 4)
 
@@ -41,6 +42,58 @@ def touched(folder: Path, *names: str) -> list[Path]:
 )
 def test_times_in_names(text: str, expected: datetime.datetime | None) -> None:
     assert time_of(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("2020", datetime.datetime(2020, 1, 1)),
+        ("2020-03", datetime.datetime(2020, 3, 1)),
+        ("20200304", DAY),
+        (" 2020-03-04 ", DAY),
+        ("2020-03-04T10", DAY.replace(hour=10)),
+        ("2020-03-04 10:20", DAY.replace(hour=10, minute=20)),
+        ("20200304T102030Z", DAY.replace(hour=10, minute=20, second=30)),
+        ("2020-03-04T10:20:30.5Z", datetime.datetime(2020, 3, 4, 10, 20, 30, 500_000)),
+        # Nanoseconds, as catalogues have them, are cut off.
+        ("2020-03-04T10:20:30.123456789Z", datetime.datetime(2020, 3, 4, 10, 20, 30, 123_456)),
+        ("2020-03-03T22:30:00-01:30", DAY),
+        ("2020-03-04T02+02", DAY),
+    ],
+)
+def test_stated_times(text: str, expected: datetime.datetime) -> None:
+    assert stated_time(text) == expected
+
+
+NO_TIMES = (
+    "15.06.2020",
+    "2020-1-5",
+    "2020-13-45",
+    "2020-00-05",
+    "2020-0304",
+    "202003",
+    "2020-02-30",
+    "2020-01-15T99:00",
+    "2020-01-15T10:00:00+99:00",
+    "2020-01-15 at noon",
+    "S2A_20200304T101",
+    "0001-01-01T00:00+01:00",
+)
+
+
+@pytest.mark.parametrize("text", NO_TIMES)
+def test_what_is_not_wholly_a_time_is_none(text: str, tmp_path: Path) -> None:
+    """A day or a year within it might be another one than was meant."""
+    assert stated_time(text) is None
+    table = tmp_path / "dates.csv"
+    table.write_text(f"file,time\nx.tif,{text}\n")
+    with pytest.raises(ParameterError, match=r"row 1: '.*' is no time \(ISO 8601\)"):
+        list_dates([table], None)
+    found = {**item(1, red={"href": "r.tif"}), "properties": {"datetime": text}}
+    path = tmp_path / "item.json"
+    path.write_text(json.dumps(found))
+    with pytest.raises(ParameterError, match=r"item-1: '.*' is no time \(ISO 8601\)"):
+        list_dates([path], None)
 
 
 def test_files_folders_and_patterns_are_one_list_in_time(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from ..rasters.grid import LON_LAT, Grid, epsg_of, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES
 from ..registration.verdict import Verdict
-from ..stac_items import time_of
+from ..stac_items import stated_time, time_of
 
 VERSION = "1.0.0"
 EXTENSIONS = (
@@ -57,7 +57,7 @@ def stac_item(
     time
         When the image was taken; None: as `source` states it.
     """
-    time = time or time_of(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
+    time = time or stated_time(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
     time = time or time_of(file_name(source.path))
     if time is None or grid.crs is None:
         return {}

@@ -13,7 +13,15 @@ from pathlib import Path
 from ..errors import ParameterError
 from ..raster_names import file_name, identity, located
 from ..registration.user_masks import UserMask
-from ..stac_items import RASTER_SUFFIXES, StacItem, is_item, raster_of_item, read_items, time_of
+from ..stac_items import (
+    RASTER_SUFFIXES,
+    StacItem,
+    is_item,
+    raster_of_item,
+    read_items,
+    stated_time,
+    time_of,
+)
 from ..tables import read_rows
 
 _TABLE = (".csv",)
@@ -187,9 +195,7 @@ def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:
     if "file" not in row:
         raise ParameterError(f"{path}, row {number}: no file ({', '.join(_COLUMNS)})")
     date = _file(raster_of_item(located(row["file"], path)))
-    time = time_of(row["time"]) if "time" in row else date.time
-    if "time" in row and time is None:
-        raise ParameterError(f"{path}, row {number}: {row['time']!r} is no time (ISO 8601)")
+    time = _stated(row["time"], f"{path}, row {number}") if "time" in row else date.time
     given = located(row["mask"], path) if "mask" in row else None
     try:
         mask = UserMask.of(date.raster, given, row.get("mask_values"))
@@ -198,12 +204,19 @@ def _of_row(path: Path, number: int, row: Mapping[str, str]) -> Listed:
     return Listed(row.get("name", date.name), date.raster, time, mask)
 
 
+def _stated(text: str, place: str) -> datetime.datetime:
+    time = stated_time(text)
+    if time is None:
+        raise ParameterError(f"{place}: {text!r} is no time (ISO 8601)")
+    return time
+
+
 def _of_stac(given: Path | str, asset: str | None) -> list[Listed]:
     items, named = read_items(given)
     return [_of_item(item, named or asset) for item in items]
 
 
 def _of_item(item: StacItem, asset: str | None) -> Listed:
-    time = None if item.time is None else time_of(item.time)
+    time = None if item.time is None else _stated(item.time, f"{item.place}, item {item.id}")
     raster = item.raster(asset)
     return Listed(item.id, raster, time, UserMask.of(raster, None, None))
