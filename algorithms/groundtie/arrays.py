@@ -82,6 +82,8 @@ class Raster:
         ------
         ParameterError
             rioxarray is not imported, or the array has other dimensions than bands, y and x.
+        GeoreferencingError
+            Its coordinates are uneven: rows or columns are missing.
         """
         if not hasattr(array, "rio"):
             raise ParameterError("a DataArray needs rioxarray: install and import it")
@@ -214,12 +216,28 @@ def _transform_of(array: Any) -> Affine | None:
     if located.x_dim not in array.coords or located.y_dim not in array.coords:
         # rioxarray has the identity for none.
         return None if stored.is_identity or located.crs is None else stored
+    for dim in (located.x_dim, located.y_dim):
+        _require_even(str(dim), np.asarray(array.coords[dim]))
     # The stored one is exact, but that of the whole where the array is a part: coordinates
     # show which.
     found = located.transform(recalc=True)
     corners = np.array([[0, 0, 1], [located.width, located.height, 1]])
     apart = corners @ np.subtract(found[:6], stored[:6]).reshape(2, 3).T
     return stored if np.abs(apart).max() < _SAME_PX * abs(found.a) else found
+
+
+def _require_even(name: str, coordinates: NDArray[Any]) -> None:
+    """Raise an error unless coordinates, shape (n,), are those of an even grid."""
+    even, step = np.linspace(coordinates[0], coordinates[-1], coordinates.size, retstep=True)
+    # Those of netCDF are often floats of four bytes, and rounded by more than a share of a pixel.
+    rounded = np.spacing(np.abs(coordinates).max()) if coordinates.dtype.kind == "f" else 0.0
+    apart = np.abs(coordinates - even).max()
+    # Of a single coordinate, the step is NaN; of several, where one of them is.
+    if coordinates.size > 1 and not apart <= _SAME_PX * abs(step) + 2 * rounded:
+        raise GeoreferencingError(
+            f"the coordinates {name} of an array are uneven: rows or columns of it are missing, "
+            "or in another order"
+        )
 
 
 def _crs(crs: Any) -> CRS | None:

@@ -17,7 +17,13 @@ from rasterio.io import MemoryFile
 from rasterio.vrt import WarpedVRT
 
 from groundtie.arrays import Raster
-from groundtie.errors import BandError, ParameterError, RasterOpenError, SameFileError
+from groundtie.errors import (
+    BandError,
+    GeoreferencingError,
+    ParameterError,
+    RasterOpenError,
+    SameFileError,
+)
 from groundtie.rasters.grid import PIXEL_COORDINATES
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import Window, open_raster
@@ -233,6 +239,16 @@ class TestXarray:
         np.testing.assert_allclose(part.transform[:6], moved[:6], atol=1e-6)
         assert (part.values.shape, part.crs, part.nodata) == ((16, 20), UTM, 7)
 
+    def test_columns_that_are_cut_out_leave_no_grid(self, opened: Any) -> None:
+        kept = np.r_[0:10, 14:30]
+        for axis in ("x", "y"):
+            with pytest.raises(GeoreferencingError, match=rf"coordinates {axis} .* uneven"):
+                Raster.from_xarray(opened[1].isel({axis: kept}))
+        # Every second one is even.
+        part = Raster.from_xarray(opened[1].isel(band=0, x=slice(0, 20, 2)))
+        assert part.transform is not None
+        assert part.transform.a == pytest.approx(2 * GRID.transform.a)
+
     def test_without_coordinates_a_crs_locates_nothing(self, opened: Any, tmp_path: Path) -> None:
         bare = opened[1].drop_vars(["x", "y", "spatial_ref"]).rio.write_crs(UTM)
         path = write_raster(tmp_path / "bare.tif", opened[1].values, crs=UTM, nodata=7)
@@ -257,6 +273,53 @@ class TestXarray:
             Raster.from_xarray(opened[1].expand_dims("time"))
 
 
+def take_for_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    exceptions = SimpleNamespace(RioXarrayError=KeyError)
+    monkeypatch.setitem(sys.modules, "rioxarray", SimpleNamespace(exceptions=exceptions))
+    monkeypatch.setitem(sys.modules, "rioxarray.exceptions", exceptions)
+
+
+EVEN = 5e5 + 10.0 * np.arange(6)
+
+
+@pytest.mark.parametrize(
+    ("across", "is_even"),
+    [
+        (EVEN, True),
+        (EVEN[::-1], True),
+        (EVEN[:1], True),
+        (EVEN.astype(int), True),
+        (EVEN + 0.005 * np.array([0, 1, -1, 1, 0, 0]), True),
+        # A float of four bytes holds longitudes to 1e-6 degrees or so: a hundredth of this pixel.
+        ((10 + 1e-4 * np.arange(6)).astype(np.float32), True),
+        (EVEN + 0.02 * np.array([0, 1, 0, 0, 0, 0]), False),
+        (EVEN[[0, 1, 3, 4, 5, 5]], False),
+        (EVEN[[0, 2, 1, 3, 4, 5]], False),
+        (np.array([5e5, np.nan, 500_020]), False),
+    ],
+)
+def test_coordinates_are_even_or_no_grid(
+    monkeypatch: pytest.MonkeyPatch, across: Any, is_even: bool
+) -> None:
+    width, height = len(across), 3
+    located = SimpleNamespace(x_dim="x", y_dim="y", crs=UTM, nodata=None)
+    located.width, located.height = width, height
+    located.transform = lambda recalc=False: GRID.transform
+    values = np.zeros((height, width))
+    array = SimpleNamespace(
+        dims=("y", "x"),
+        coords={"x": across, "y": 1.0 * np.arange(height)},
+        rio=located,
+        transpose=lambda *_: SimpleNamespace(values=values),
+    )
+    take_for_installed(monkeypatch)
+    if is_even:
+        assert Raster.from_xarray(array).transform == GRID.transform
+        return
+    with pytest.raises(GeoreferencingError, match=r"coordinates x .* uneven"):
+        Raster.from_xarray(array)
+
+
 @pytest.mark.parametrize(
     ("stored", "transform", "crs"),
     [(Affine.identity(), None, None), (GRID.transform, GRID.transform, UTM)],
@@ -270,9 +333,7 @@ def test_an_array_with_a_crs_and_no_coordinates(
     bare = SimpleNamespace(
         dims=("y", "x"), coords={}, rio=located, transpose=lambda *_: SimpleNamespace(values=values)
     )
-    exceptions = SimpleNamespace(RioXarrayError=KeyError)
-    monkeypatch.setitem(sys.modules, "rioxarray", SimpleNamespace(exceptions=exceptions))
-    monkeypatch.setitem(sys.modules, "rioxarray.exceptions", exceptions)
+    take_for_installed(monkeypatch)
     raster = Raster.from_xarray(bare)
     assert (raster.transform, raster.crs, raster.nodata) == (transform, crs, 7)
     with open_raster(bare) as source:
