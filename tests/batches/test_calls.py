@@ -69,6 +69,27 @@ def test_required_outputs_have_the_names_of_their_rows(folders: tuple[Path, Path
     assert calls[9].outputs == {"output": folders[1] / "Rome.tif"}
 
 
+@pytest.mark.parametrize(
+    "name", ["..", "../x", "B/../../x", "B/..", "..\\x", "B\\../x", "/tmp/x", "a\0b"]
+)
+def test_a_name_leads_not_out_of_the_output_folder(folders: tuple[Path, Path], name: str) -> None:
+    """Not even where no output is named by it: the next table may do so."""
+    first, second, third = calls_of(
+        folders, {**ROW, "name": name}, {**ROW, "name": name, "output": "c.tif"}, ROW
+    )
+    for call in (first, second):
+        assert call.problem.startswith("the row's name ")
+        assert call.outputs == {}
+    assert third.problem == ""
+    assert sorted(folders[0].parent.iterdir()) == sorted(folders)
+
+
+@pytest.mark.parametrize("name", ["B/x", "v1.2..b", "..b", "S1A:10"])
+def test_a_name_may_lead_into_it(folders: tuple[Path, Path], name: str) -> None:
+    (call,) = calls_of(folders, {**ROW, "name": name})
+    assert (call.problem, call.outputs) == ("", {"output": folders[1] / f"{name}.tif"})
+
+
 @pytest.mark.parametrize(("word", "value"), [("yes", True), ("No", False), ("1", True), (0, False)])
 def test_flags_are_words(folders: tuple[Path, Path], word: Any, value: bool) -> None:
     (call,) = calls_of(folders, {**ROW, "careful": word})

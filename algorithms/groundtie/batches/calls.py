@@ -100,6 +100,7 @@ def _call(
     outputs: Path,
     listed: Listed,
 ) -> Call:
+    _require_inside(name)
     values = {
         p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
     }
@@ -115,6 +116,14 @@ def _call(
     call = Call(number, name, checked, written)
     read = facts_read(tool, checked, tuple(files_written(tool, call)), listed)
     return replace(call, key=digest(tool.run_of_call(checked), places, read))
+
+
+def _require_inside(name: str) -> None:
+    """Raise an error for a row's name by which its outputs would leave the output folder."""
+    # Both signs: a table may be run on another system than before.
+    parts = name.replace("\\", "/").split("/")
+    if ".." in parts or Path(name).is_absolute() or "\0" in name:
+        raise ParameterError(f"the row's name {name!r} cannot name a file in the output folder")
 
 
 def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: Path) -> Any:
