@@ -672,8 +672,8 @@
       <translation>Wie weit die RPCs am Boden daneben liegen; die Richtung wird ausgelost.</translation>
     </message>
     <message>
-      <source>How far the RPCs may be wrong on the ground. By default 100 m or 20 pixels of the coarser image, whichever is larger.</source>
-      <translation>Wie weit die RPCs am Boden falsch sein können. Ohne Angabe 100 m oder 20 Pixel des gröberen Bildes, je nachdem, was größer ist.</translation>
+      <source>How far the RPCs may be wrong on the ground. By default 100 m or 20 pixels of the coarser image, whichever is larger. No hard limit: finer stages look some 20 pixels further, those of images reduced to 512 pixels where they are larger.</source>
+      <translation>Wie weit die RPCs am Boden falsch sein können. Ohne Angabe 100 m oder 20 Pixel des gröberen Bildes, je nachdem, was größer ist. Keine feste Grenze: Feinere Stufen suchen rund 20 Pixel weiter, bei größeren Bildern Pixel der auf 512 Pixel verkleinerten.</translation>
     </message>
     <message>
       <source>How far the input may be rotated, either way, against its nominal geotransform. By default not at all; match_sar_sar and match_optical search any rotation where there is no georeferencing.</source>
@@ -684,8 +684,8 @@
       <translation>Wie weit die Eingabe von ihrer Solllage liegen kann, entlang von Zeilen und Spalten; ohne Georeferenz, wie weit die Bildmitten auseinanderliegen, in Pixeln der Eingabe. Ohne Angabe ein Viertel der längeren Seite der Eingabe.</translation>
     </message>
     <message>
-      <source>How far the input may lie from its right place. By default 100 m or 20 pixels of the coarser image, whichever is larger; match_sar_sar and match_optical search a quarter of the input's longer side where there is no georeferencing.</source>
-      <translation>Wie weit die Eingabe von ihrem richtigen Ort liegen kann. Ohne Angabe 100 m oder 20 Pixel des gröberen Bildes, je nachdem, was größer ist; match_sar_sar und match_optical suchen ein Viertel der längeren Seite der Eingabe, wo keine Georeferenz ist.</translation>
+      <source>How far the input may lie from its right place. By default 100 m or 20 pixels of the coarser image, whichever is larger; match_sar_sar and match_optical search a quarter of the input's longer side where there is no georeferencing. No hard limit: finer stages look some 20 pixels further, those of images reduced to 512 pixels where they are larger.</source>
+      <translation>Wie weit die Eingabe von ihrem richtigen Ort liegen kann. Ohne Angabe 100 m oder 20 Pixel des gröberen Bildes, je nachdem, was größer ist; match_sar_sar und match_optical suchen ein Viertel der längeren Seite der Eingabe, wo keine Georeferenz ist. Keine feste Grenze: Feinere Stufen suchen rund 20 Pixel weiter, bei größeren Bildern Pixel der auf 512 Pixel verkleinerten.</translation>
     </message>
     <message>
       <source>How far the optical image is off; the direction is drawn.</source>

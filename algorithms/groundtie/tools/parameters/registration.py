@@ -68,7 +68,8 @@ SearchRadius = Annotated[
     Distance(
         help="How far the input may lie from its right place. By default 100 m or 20 pixels of "
         "the coarser image, whichever is larger; match_sar_sar and match_optical search a quarter "
-        "of the input's longer side where there is no georeferencing.",
+        "of the input's longer side where there is no georeferencing. No hard limit: finer stages "
+        "look some 20 pixels further, those of images reduced to 512 pixels where they are larger.",
     ),
 ]
 SearchRotation = Annotated[

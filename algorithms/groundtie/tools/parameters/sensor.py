@@ -81,7 +81,8 @@ RpcSearchRadius = Annotated[
     float | None,
     Distance(
         help="How far the RPCs may be wrong on the ground. By default 100 m or 20 pixels of the "
-        "coarser image, whichever is larger.",
+        "coarser image, whichever is larger. No hard limit: finer stages look some 20 pixels "
+        "further, those of images reduced to 512 pixels where they are larger.",
     ),
 ]
 ImageBand = Annotated[int | None, replace(MATCHED_BAND, label="Band of the image", of="image")]
