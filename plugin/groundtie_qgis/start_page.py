@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -26,6 +27,7 @@ from .library import library_module
 from .preselection import proposed_pair, raster_files
 from .reference_export import MAP, with_files
 from .run import Outcome, Run, new_file
+from .search import usual_radius_m
 from .sensor_run import SensorImage, SensorRun
 from .start_files import has_rpcs, points_name
 from .translation import mark, tr
@@ -40,7 +42,6 @@ PAIRS = {
     "match_sar_sar": mark("SAR and SAR"),
     "match_optical": mark("Optical and optical"),
 }
-_FIRST_RADIUS_M = 200.0
 _ANY_ROTATION_DEG = 180.0
 
 
@@ -261,9 +262,10 @@ class StartPage(QWidget):
 
     def search_farther(self) -> None:
         """Try again with a radius twice as large."""
+        usual_m = usual_radius_m(self.pair.currentData(), *self._layers) if self._layers else 0.0
         if self.sensor is None:
             self._ask_for_a_search()
-        self.radius.setValue(2 * self.radius.value() or _FIRST_RADIUS_M)
+        self.radius.setValue(2 * self.radius.value() or math.ceil(2 * usual_m))
         self.start_or_cancel()
 
     def allow_rotation(self) -> None:

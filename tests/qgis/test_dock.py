@@ -185,6 +185,54 @@ def test_what_a_refusal_offers_is_what_is_asked_for(
     assert start.bands.values() == {}
 
 
+@pytest.mark.parametrize(
+    ("tool", "pixels_m", "first"),
+    [
+        # Twice the larger of 100 m and 20 pixels of the coarser image.
+        ("coregister", (1, 1), 200),
+        ("register", (1, 30), 1200),
+        ("match_optical", (10, 1), 400),
+        # Without georeferencing: 20 pixels, or a quarter of the input's 64.
+        ("coregister", None, 40),
+        ("match_sar_sar", None, 32),
+        ("register", None, 32),
+    ],
+)
+def test_farther_is_twice_as_far_as_was_searched(
+    desktop: Desktop,
+    tmp_path: Path,
+    asked: list[tuple[str, dict[str, Any]]],
+    tool: str,
+    pixels_m: tuple[int, int] | None,
+    first: float,
+) -> None:
+    random = np.random.Generator(np.random.PCG64(0))
+    for name, size in zip(("reference", "input"), pixels_m or (None, None), strict=True):
+        place = None if size is None else rasterio.transform.from_origin(*ORIGIN, size, size)
+        write_raster(tmp_path / f"{name}.tif", random.uniform(1, 254, (1, 64, 64)), place)
+    reference, input = desktop.load(tmp_path, "reference", "input")
+    start = desktop.open().start
+    start.reference.setLayer(reference)
+    start.input.setLayer(input)
+    start.pair.setCurrentIndex(start.pair.findData(tool))
+    desktop.register()
+    assert "SEARCH_RADIUS" not in asked.pop()[1]
+    for radius in (first, 2 * first):
+        start.tries.wider.click()
+        assert asked.pop()[1]["SEARCH_RADIUS"] == radius
+
+
+def test_how_far_an_image_with_rpcs_is_searched(desktop: Desktop, tmp_path: Path) -> None:
+    """Its own file states no size of its pixels on the ground, which is 1 m."""
+    from groundtie_qgis import search
+
+    make_scene(tmp_path, None)
+    reference, image = desktop.load(tmp_path, "reference", "image")
+    assert search._grid(image).pixel_size_m == pytest.approx(1, rel=0.1)
+    assert search.usual_radius_m("register", reference, image) == pytest.approx(100)
+    assert search.usual_radius_m("register", None, image) == 0
+
+
 def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
     start = desktop.open().start
     start.register.click()

@@ -11,10 +11,11 @@ from typing import Any
 from ..context import Context
 from ..geometry.terrain import Terrain
 from ..masks.used import MaskUsed
-from ..rasters.pair import Image, ImagePair, coarser_m, make_pair
+from ..rasters.grid import Grid
+from ..rasters.pair import Image, ImagePair, coarser_m, default_radius_m, make_pair
 from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered
-from .specification import Specification
+from .specification import FreeSearch, Specification
 from .surface_masks import rendered_surface
 from .user_masks import with_user_masks
 
@@ -98,8 +99,7 @@ def pair_images(
     usual_m = spec.enlargement * coarser_m(reference.source.grid, grid)
     radius_m, rotation_deg, scale = spec.search_radius_m, spec.rotation_deg, spec.scale
     if not grid.is_georeferenced:
-        if radius_m is None and spec.free.radius_share is not None:
-            radius_m = spec.free.radius_share * max(grid.size)
+        radius_m = _free_radius_m(grid, spec.free) if radius_m is None else radius_m
         rotation_deg = spec.free.rotation_deg if rotation_deg is None else rotation_deg
         scale = spec.free.scale if scale is None else scale
     images = make_pair(
@@ -122,6 +122,25 @@ def pair_images(
         context.update(0.0, note)
     pair, used = with_user_masks(images, masks, stack, context.part(0.0, 0.02))
     return OpenPair(images, pair, used, stack, started)
+
+
+def usual_radius_m(reference: Grid, input: Grid, free: FreeSearch) -> float:
+    """Return how far the input of a pair is searched for where nobody states it.
+
+    Parameters
+    ----------
+    reference, input
+        The grids of both images.
+    free
+        What is searched where there is no georeferencing.
+    """
+    share_m = None if input.is_georeferenced else _free_radius_m(input, free)
+    factor = coarser_m(reference, input) / reference.pixel_size_m
+    return default_radius_m(reference.scaled(factor)) if share_m is None else share_m
+
+
+def _free_radius_m(grid: Grid, free: FreeSearch) -> float | None:
+    return None if free.radius_share is None else free.radius_share * max(grid.size)
 
 
 def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:

@@ -1,0 +1,49 @@
+"""How far the input of a pair is searched for where nobody states it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contexts import context
+from raster_files import utm_grid, write_raster
+
+from groundtie.context import Context
+from groundtie.rasters.grid import Grid
+from groundtie.registration.opening import open_pair, usual_radius_m
+from groundtie.registration.specification import COREGISTER, OPTICAL, Specification
+
+__all__ = ["context"]
+
+
+@pytest.mark.parametrize(
+    ("pixels_m", "spec", "radius_m"),
+    [
+        ((1.0, 1.0), COREGISTER, 100.0),
+        ((10.0, 30.0), COREGISTER, 600.0),
+        ((10.0, 1.0), OPTICAL, 200.0),
+        (None, COREGISTER, 20.0),
+        (None, OPTICAL, 75.0),
+    ],
+)
+def test_the_usual_radius_is_what_is_searched(
+    tmp_path: Path,
+    context: Context,
+    pixels_m: tuple[float, float] | None,
+    spec: Specification,
+    radius_m: float,
+) -> None:
+    values = np.random.default_rng(0).integers(1, 255, (1, 300, 300)).astype(np.uint8)
+    grids: list[Grid | None] = [None, None]
+    if pixels_m is not None:
+        grids = [utm_grid(300, 300, size) for size in pixels_m]
+    paths = [
+        write_raster(tmp_path / f"{name}.tif", values, grid)
+        for name, grid in zip("ab", grids, strict=True)
+    ]
+    with open_pair(*paths, spec, context) as opened:
+        pair = opened.images
+        found = usual_radius_m(pair.reference.source.grid, pair.input.source.grid, spec.free)
+        assert found == pytest.approx(radius_m)
+        assert pair.limits.radius == pytest.approx(radius_m)
