@@ -399,5 +399,5 @@ def test_edited_lines_are_told(tmp_path: Path) -> None:
         feature["geometry"]["coordinates"][1][0] += 1e-3
     points.write_text(json.dumps(collection))
     result = warp(path, tmp_path / "out.tif", points)
-    assert "edited by hand: 4 points; their lines count, not their columns" in result.lines()
+    assert "edited by hand: 4 points; of lines the ends count, not the columns" in result.lines()
     assert result.summary()["tie_points"]["edited"] == 4

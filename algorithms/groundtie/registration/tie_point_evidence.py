@@ -45,7 +45,7 @@ class TiePointFit:
         log10 of the expected number of models that random points would fit as well; None: the
         points are no more than the model needs, and fit any.
     edited
-        Number of points whose lines were moved or drawn by a person.
+        Number of points that a person moved or drew, by their lines or the column of that name.
     """
 
     points: int
@@ -67,7 +67,7 @@ class TiePointFit:
             lines.append(f"error at {self.check_points} check points: {error}")
         if self.edited:
             lines.append(
-                f"edited by hand: {self.edited} points; their lines count, not their columns"
+                f"edited by hand: {self.edited} points; of lines the ends count, not the columns"
             )
         return lines
 
