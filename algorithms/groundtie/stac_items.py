@@ -7,11 +7,13 @@ Plain JSON is read, of any version of STAC: what is needed has not changed since
 from __future__ import annotations
 
 import datetime
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from .errors import ParameterError
 from .raster_names import file_name, located
@@ -78,7 +80,19 @@ class StacItem:
         name = rasters[0] if asset is None else asset
         if name not in self.assets:
             raise ParameterError(f"{self.place}: the item {self.id} has no asset {name}")
-        return located(str(self.assets[name]["href"]), self.place)
+        return place_of_asset(self.assets[name], self.place)
+
+
+def place_of_asset(asset: Mapping[str, Any], place: Path | str) -> Path | str:
+    """Return where an asset of an item at `place` lies: a file, or GDAL's name of it.
+
+    Catalogues state URLs, in which a file's name is percent-encoded, but many do not encode it.
+    """
+    href = str(asset["href"])
+    found = located(href, place)
+    if isinstance(found, Path) and not os.path.exists(found):
+        return located(unquote(href), place)
+    return found
 
 
 def is_item(name: Path | str) -> bool:

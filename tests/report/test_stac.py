@@ -106,6 +106,24 @@ def test_metadata_that_are_no_time_leave_it_to_the_name(tmp_path: Path) -> None:
     assert found["properties"]["datetime"] == "2024-05-06T00:00:00Z"
 
 
+def test_the_asset_of_any_name_is_a_url_that_leads_to_it(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "s2_20240506.tif", np.ones((20, 30), np.uint8), GRID)
+    output = tmp_path / "r ü#1 100%.tif"
+    with open_raster(path) as source:
+        found = stac_item(source, output, GRID, tmp_path, {})
+    href = found["assets"]["data"]["href"]
+    assert href == "r%20%C3%BC%231%20100%25.tif"
+    stored = tmp_path / "item.json"
+    stored.write_text(json.dumps(found))
+    assert raster_of_item(stored) == output
+    # Others write names as they are, and a file of that very name comes first.
+    literal = tmp_path / "a%20b.tif"
+    literal.touch()
+    found["assets"]["data"]["href"] = literal.name
+    stored.write_text(json.dumps(found))
+    assert raster_of_item(stored) == literal
+
+
 @pytest.mark.slow
 def test_the_numbers_of_a_report_are_an_item_that_tools_read(
     textured: TexturedPair, tmp_path: Path, context: Context

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -111,7 +112,8 @@ def _asset(output: Path, folder: Path) -> dict[str, Any]:
         href = Path(os.path.relpath(output, folder)).as_posix()
     except ValueError:  # another disk of Windows
         href = output.resolve().as_posix()
-    asset: dict[str, Any] = {"href": href, "roles": ["data"]}
+    # A URL, relative or not: a # in a name would begin a fragment.
+    asset: dict[str, Any] = {"href": quote(href, safe="/:"), "roles": ["data"]}
     if output.name.lower().endswith(COG_SUFFIXES):
         return asset | {"type": f"{_TIFF}; profile=cloud-optimized"}
     # The media type of others is none that readers know.

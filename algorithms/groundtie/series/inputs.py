@@ -17,6 +17,7 @@ from ..stac_items import (
     RASTER_SUFFIXES,
     StacItem,
     is_item,
+    place_of_asset,
     raster_of_item,
     read_items,
     stated_time,
@@ -149,7 +150,7 @@ def _named_in(given: Path) -> Iterator[Path | str]:
     if is_item(given):
         for item in read_items(given)[0]:
             yield item.place
-            yield from (located(str(asset["href"]), item.place) for asset in item.assets.values())
+            yield from (place_of_asset(asset, item.place) for asset in item.assets.values())
     elif given.suffix.lower() in _TABLE:
         for row in read_rows(given):
             yield from (located(row[name], given) for name in ("file", "mask") if name in row)
