@@ -53,8 +53,8 @@ __all__ = [
 # Matches are taken to be as exact as this, in pixels, where no better value is given.
 _USUAL_SIGMA_PX = 0.25
 
-_RADIUS = Number(label="Radius", help="Largest shift.", unit="px", minimum=0, integer=True)
-_SIMILARITY = Choice(label="Similarity", help="What is compared.", choices=SIMILARITIES)
+_RADIUS = Number(help="Largest shift.", unit="px", minimum=0, integer=True)
+_SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
 
 
 def similarity_surface(
