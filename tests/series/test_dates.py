@@ -44,6 +44,18 @@ def keys(folder: Path, context: Context, ending: str = ".tif") -> tuple[str, str
         return second.key, pair, files.raster_key(one, series)
 
 
+def test_a_date_is_the_same_from_another_folder(
+    tmp_path: Path, one_thread: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in "ab":
+        write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32))
+    before = keys(tmp_path, one_thread)[0]
+    monkeypatch.chdir(tmp_path)
+    assert keys(Path("."), one_thread)[0] == before
+    monkeypatch.chdir("/")
+    assert keys(tmp_path.relative_to("/") / "." / ".." / tmp_path.name, one_thread)[0] == before
+
+
 @pytest.mark.parametrize("changed", ["geotransform", "crs"])
 def test_georeferencing_that_a_sidecar_changes_is_another_date(
     tmp_path: Path, one_thread: Context, changed: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -230,6 +231,7 @@ def parts_of_layer(layer: Any) -> list[Any]:
 
 
 def file_facts(path: Path | str | None) -> tuple[Any, ...]:
-    """Return name, size and time of the last change of a file; of another, its name."""
+    """Return place, size and time of the last change of a file; of another, its name."""
     state = None if path is None else file_state(path)
-    return (str(path), *(state or ()))
+    # A file is the same from whatever folder it is named.
+    return (str(path),) if path is None or state is None else (os.path.abspath(path), *state)
