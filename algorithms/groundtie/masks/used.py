@@ -47,6 +47,11 @@ class MaskUsed:
     is_reliable: bool = True
     elevated_px: float = 0.0
 
+    @classmethod
+    def none(cls, reason: str, elevated_px: float = 0.0) -> MaskUsed:
+        """Return that no mask was used, and why."""
+        return cls(NONE, None, 1.0, reason, elevated_px=elevated_px)
+
     @property
     def is_ground(self) -> bool:
         """Whether nothing but ground takes part, as far as the mask is right."""

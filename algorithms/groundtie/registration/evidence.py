@@ -24,7 +24,7 @@ from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
-from ..masks.used import NONE, MaskUsed
+from ..masks.used import MaskUsed
 from ..matching.check import CHECK_RADIUS_PX
 from ..matching.surveys import Surveys
 from ..rasters.grid import FloatArray, Grid, PointFunction
@@ -229,7 +229,7 @@ class RegistrationEvidence:
     scene: SceneInfo
     tries: int = 1
     layover_factor: float | None = None
-    mask: MaskUsed = field(default_factory=lambda: MaskUsed(NONE, None, 1.0, ""))
+    mask: MaskUsed = field(default_factory=lambda: MaskUsed.none(""))
     surveys: Surveys = field(default_factory=Surveys)
     input_fit: ModelFit | None = None
     exchanged: Agreement | None = None

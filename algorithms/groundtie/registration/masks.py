@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from ..context import Context
 from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
-from ..masks.used import GROUND, NONE, OPEN, REFERENCE, MaskUsed
+from ..masks.used import GROUND, OPEN, REFERENCE, MaskUsed
 from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask
@@ -84,19 +84,17 @@ def with_ground_mask(
         Threads and progress.
     """
     if not scene.is_radar_and_camera:
-        return Masked(
-            pair, scene, MaskUsed(NONE, None, 1.0, "there is no radar image beside a camera's")
-        )
+        return Masked(pair, scene, MaskUsed.none("there is no radar image beside a camera's"))
     if not scene.is_town:
         reason = f"{_shown(scene)}: too few for a town"
-        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(pair, scene, MaskUsed.none(reason))
     if scene.is_town_of_unknown_size:
         reason = f"{_shown(scene)}, as in a town, in pixels of unknown size"
-        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(pair, scene, MaskUsed.none(reason))
     if not scene.shows_ground:
         reason = f"{_shown(scene)}, as in a town, in pixels too large to resolve streets"
         elevated_px = _WHOLE_M / pair.grid.pixel_size_m
-        return Masked(pair, scene, MaskUsed(NONE, None, 1.0, reason, elevated_px=elevated_px))
+        return Masked(pair, scene, MaskUsed.none(reason, elevated_px))
     return _of_town(pair, scene, stack, context)
 
 

@@ -62,7 +62,7 @@ def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: 
         return Masked(opened.pair, scene, opened.user_mask)
     if spec.surface_view is not None:
         reason = "the surface model is rendered with the layover of the radar image"
-        return Masked(opened.pair, scene, MaskUsed(NONE, None, 1.0, reason))
+        return Masked(opened.pair, scene, MaskUsed.none(reason))
     return with_ground_mask(opened.pair, scene, opened.stack, context)
 
 

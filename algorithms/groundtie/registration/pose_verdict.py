@@ -18,7 +18,7 @@ from ..geometry.estimation import jackknife_spread
 from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
-from ..masks.used import NONE, MaskUsed
+from ..masks.used import MaskUsed
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
 from ..matching.survey import SURVEY_RADIUS_PX
 from ..matching.surveys import Surveys
@@ -137,7 +137,7 @@ class PoseSurveyEvidence:
     # The pose is what a search found; chips all over are none that it was fitted to.
     fit_points: ClassVar = 0
     fit_points_used: ClassVar = 0
-    mask: ClassVar = MaskUsed(NONE, None, 1.0, "a pose is searched for without a mask")
+    mask: ClassVar = MaskUsed.none("a pose is searched for without a mask")
 
     @property
     def metres_per_px(self) -> float | None:
