@@ -27,7 +27,7 @@ from groundtie.errors import (
 from groundtie.rasters.grid import PIXEL_COORDINATES
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import Window, open_raster
-from groundtie.rasters.writing import require_fit
+from groundtie.rasters.writing import shared_nodata
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(60, 40)
@@ -69,7 +69,7 @@ def test_no_integer_is_infinite_or_nan(nodata: float) -> None:
     with open_raster(Raster(np.zeros((2, 3), np.uint8), nodata=nodata)) as source:
         assert source.read(source.window)[1].all()
         with pytest.raises(ParameterError, match="type uint8 cannot hold the nodata value"):
-            require_fit(nodata, source.dtype)
+            shared_nodata(source)
 
 
 @pytest.mark.parametrize("nodata", [7, 7.0, np.uint16(7), np.float32(7)])
