@@ -27,6 +27,10 @@ _HELD_BY = {
 # Transforms that differ by less at the corners are the same.
 _SAME_PX = 1e-3
 
+# Coordinates of an even grid may be rounded by this much, as degrees to six digits are; where a row
+# or column is missing, one of them is off by half a pixel or more.
+_EVEN_PX = 0.05
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Raster:
@@ -233,7 +237,7 @@ def _require_even(name: str, coordinates: NDArray[Any]) -> None:
     rounded = np.spacing(np.abs(coordinates).max()) if coordinates.dtype.kind == "f" else 0.0
     apart = np.abs(coordinates - even).max()
     # Of a single coordinate, the step is NaN; of several, where one of them is.
-    if coordinates.size > 1 and not apart <= _SAME_PX * abs(step) + 2 * rounded:
+    if coordinates.size > 1 and not apart <= _EVEN_PX * abs(step) + 2 * rounded:
         raise GeoreferencingError(
             f"the coordinates {name} of an array are uneven: rows or columns of it are missing, "
             "or in another order"

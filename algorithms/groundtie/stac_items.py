@@ -89,10 +89,10 @@ def place_of_asset(asset: Mapping[str, Any], place: Path | str) -> Path | str:
     Catalogues state URLs, in which a file's name is percent-encoded, but many do not encode it.
     """
     href = str(asset["href"])
-    found = located(href, place)
-    if isinstance(found, Path) and not os.path.exists(found):
-        return located(unquote(href), place)
-    return found
+    literal, decoded = located(href, place), located(unquote(href), place)
+    if not isinstance(literal, Path):
+        return literal
+    return literal if os.path.exists(literal) and not os.path.exists(decoded) else decoded
 
 
 def is_item(name: Path | str) -> bool:

@@ -99,6 +99,15 @@ class TestVerdict:
         assert verdict.log10_chance < -4
         assert verdict.summary()["chance"] < 1e-4
 
+    def test_where_larger_errors_are_allowed_the_windows_are_larger(self) -> None:
+        """Of an input with ten pixels for each that it was matched in, as far as they scatter."""
+        right = self.errors(normal_errors(9, 5.0), 9).of_inliers(20.0)
+        assert Assessment(test_points=right).judge(20.0).accepted
+        for seed in range(50):
+            far = np.random.default_rng(seed).uniform(-125, 125, (9, 2))
+            points = self.errors(far, 9).of_inliers(20.0)
+            assert not Assessment(test_points=points).judge(20.0).accepted
+
     def test_a_point_that_cannot_be_placed_is_no_small_error(self) -> None:
         errors = self.errors([0.1, 0])
         errors.error_px[3] = np.inf

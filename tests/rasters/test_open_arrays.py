@@ -292,7 +292,8 @@ EVEN = 5e5 + 10.0 * np.arange(6)
         (EVEN + 0.005 * np.array([0, 1, -1, 1, 0, 0]), True),
         # A float of four bytes holds longitudes to 1e-6 degrees or so: a hundredth of this pixel.
         ((10 + 1e-4 * np.arange(6)).astype(np.float32), True),
-        (EVEN + 0.02 * np.array([0, 1, 0, 0, 0, 0]), False),
+        (np.round(11.123456 + 9e-5 * np.arange(6), 6), True),
+        (EVEN + 1.0 * np.array([0, 1, 0, 0, 0, 0]), False),
         (EVEN[[0, 1, 3, 4, 5, 5]], False),
         (EVEN[[0, 2, 1, 3, 4, 5]], False),
         (np.array([5e5, np.nan, 500_020]), False),

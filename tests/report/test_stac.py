@@ -117,11 +117,13 @@ def test_the_asset_of_any_name_is_a_url_that_leads_to_it(tmp_path: Path) -> None
     stored.write_text(json.dumps(found))
     assert raster_of_item(stored) == output
     # Others write names as they are, and a file of that very name comes first.
-    literal = tmp_path / "a%20b.tif"
+    literal, decoded = tmp_path / "a%20b.tif", tmp_path / "a b.tif"
     literal.touch()
     found["assets"]["data"]["href"] = literal.name
     stored.write_text(json.dumps(found))
     assert raster_of_item(stored) == literal
+    decoded.touch()
+    assert raster_of_item(stored) == decoded
 
 
 @pytest.mark.slow

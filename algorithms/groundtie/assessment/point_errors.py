@@ -132,20 +132,24 @@ class PointErrors:
         """Statistics in metres, along x and y of the reference map."""
         return Statistics.of(np.zeros((0, 2)) if self.error_m is None else self.error_m[self.used])
 
-    @property
-    def window_area_px2(self) -> float:
-        """Area of the windows in which outliers fall anywhere: usual ones, or as errors show."""
-        return max(_WINDOW_AREA_PX2, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
-
-    @property
-    def log10_chance(self) -> float:
-        """log10 of the probability that random matches would agree as well; 0 of none.
+    def log10_chance(self, max_error_px: float) -> float:
+        """Return log10 of the probability that random matches would agree as well; 0 of none.
 
         Within whatever radius is the least likely ([Moisan2004]).
         """
         if not self.placed.any():
             return 0.0
-        return min(log10_least_false_alarms(self.length_px, self.window_area_px2, 0), 0.0)
+        area = self._window_area_px2(max_error_px)
+        return min(log10_least_false_alarms(self.length_px, area, 0), 0.0)
+
+    def _window_area_px2(self, max_error_px: float) -> float:
+        """Return the area in which outliers fall anywhere: as errors show, or the usual windows.
+
+        These are larger, in pixels of the input, where larger errors than usual are allowed: of an
+        input finer than what it was matched in.
+        """
+        usual = _WINDOW_AREA_PX2 * max(max_error_px / USUAL_MAX_ERROR_PX, 1.0) ** 2
+        return max(usual, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
 
     def of_inliers(self, max_error_px: float | None = None) -> PointErrors:
         """Return the errors of which only those of inliers count.
@@ -158,10 +162,10 @@ class PointErrors:
         errors = self.error_px[which]
         if len(errors) == 0:
             return self
-        area = self.window_area_px2
-        sigmas = sigma_range_px(USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px)
+        limit = USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px
+        mixture = fit_mixture(errors, self._window_area_px2(limit), sigma_range_px(limit))
         counted = np.zeros(len(self), bool)
-        counted[which] = fit_mixture(errors, area, sigmas).inliers
+        counted[which] = mixture.inliers
         return replace(self, counted=counted)
 
     def summary(self) -> dict[str, Any]:
