@@ -218,7 +218,9 @@ def time_of(name: str) -> datetime.datetime | None:
     if day is None:
         year = _YEAR.search(name)
         return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
+    # Before the time of day, names mostly have another sign than ISO 8601 has.
+    stated = stated_time(name) or stated_time(name.replace("_", "T", 1))
     try:
-        return stated_time(name) or datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
+        return stated or datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]
     except ValueError:  # 30 February
         return None

@@ -262,10 +262,12 @@ class StartPage(QWidget):
 
     def search_farther(self) -> None:
         """Try again with a radius twice as large."""
-        usual_m = usual_radius_m(self.pair.currentData(), *self._layers) if self._layers else 0.0
+        searched_m = self.radius.value()
+        if not searched_m and self._layers:
+            searched_m = usual_radius_m(self.pair.currentData(), *self._layers)
         if self.sensor is None:
             self._ask_for_a_search()
-        self.radius.setValue(2 * self.radius.value() or math.ceil(2 * usual_m))
+        self.radius.setValue(math.ceil(2 * searched_m))
         self.start_or_cancel()
 
     def allow_rotation(self) -> None:

@@ -70,12 +70,16 @@ def test_required_outputs_have_the_names_of_their_rows(folders: tuple[Path, Path
 
 
 @pytest.mark.parametrize(
-    "name", ["..", "../x", "B/../../x", "B/..", "..\\x", "B\\../x", "/tmp/x", "a\0b"]
+    "name",
+    ["..", "../x", "B/../../x", "B/..", "..\\x", "B\\../x", "/tmp/x", "\\x", "D:x", "a\0b"],
 )
 def test_a_name_leads_not_out_of_the_output_folder(folders: tuple[Path, Path], name: str) -> None:
-    """Not even where no output is named by it: the next table may do so."""
+    """Where no output is named by it, it is a label."""
     first, second, third = calls_of(
-        folders, {**ROW, "name": name}, {**ROW, "name": name, "output": "c.tif"}, ROW
+        folders,
+        {**ROW, "name": name},
+        {**ROW, "name": name, "output": "of {name}.tif"},
+        {**ROW, "name": name, "output": "c.tif"},
     )
     for call in (first, second):
         assert call.problem.startswith("the row's name ")

@@ -110,13 +110,15 @@ def test_the_asset_of_any_name_is_a_url_that_leads_to_it(tmp_path: Path) -> None
     path = write_raster(tmp_path / "s2_20240506.tif", np.ones((20, 30), np.uint8), GRID)
     output = tmp_path / "r ü#1 100%.tif"
     with open_raster(path) as source:
+        other = stac_item(source, tmp_path / "\udcff.tif", GRID, tmp_path, {})
+        assert other["assets"]["data"]["href"] == "%FF.tif"  # a byte that is no UTF-8
         found = stac_item(source, output, GRID, tmp_path, {})
     href = found["assets"]["data"]["href"]
     assert href == "r%20%C3%BC%231%20100%25.tif"
     stored = tmp_path / "item.json"
     stored.write_text(json.dumps(found))
     assert raster_of_item(stored) == output
-    # Others write names as they are, and a file of that very name comes first.
+    # Others write names as they are: a file of that very name is theirs, if there is no other.
     literal, decoded = tmp_path / "a%20b.tif", tmp_path / "a b.tif"
     literal.touch()
     found["assets"]["data"]["href"] = literal.name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from ..declaration import Parameter, Tool
@@ -100,7 +100,6 @@ def _call(
     outputs: Path,
     listed: Listed,
 ) -> Call:
-    _require_inside(name)
     values = {
         p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
     }
@@ -120,9 +119,10 @@ def _call(
 
 def _require_inside(name: str) -> None:
     """Raise an error for a row's name by which its outputs would leave the output folder."""
-    # Both signs: a table may be run on another system than before.
+    # By the signs of both systems: a table may be run on another one than before.
     parts = name.replace("\\", "/").split("/")
-    if ".." in parts or Path(name).is_absolute() or "\0" in name:
+    anchor = PurePosixPath(name).anchor or PureWindowsPath(name).anchor
+    if ".." in parts or anchor or "\0" in name:
         raise ParameterError(f"the row's name {name!r} cannot name a file in the output folder")
 
 
@@ -166,6 +166,8 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
         value = stem + (kind.suffixes[0] if isinstance(kind, OutputKind) else "")
     if not isinstance(value, str):
         raise ParameterError(f"{parameter.name} must be a path, not {value!r}")
+    if "{name}" in value:
+        _require_inside(name)
     return folder / value.replace("{name}", name)
 
 

@@ -113,7 +113,7 @@ def _asset(output: Path, folder: Path) -> dict[str, Any]:
     except ValueError:  # another disk of Windows
         href = output.resolve().as_posix()
     # A URL, relative or not: a # in a name would begin a fragment.
-    asset: dict[str, Any] = {"href": quote(href, safe="/:"), "roles": ["data"]}
+    asset: dict[str, Any] = {"href": quote(os.fsencode(href), safe="/:"), "roles": ["data"]}
     if output.name.lower().endswith(COG_SUFFIXES):
         return asset | {"type": f"{_TIFF}; profile=cloud-optimized"}
     # The media type of others is none that readers know.

@@ -107,7 +107,7 @@ class Date:
 
     @cached_property
     def key(self) -> str:
-        """Stands for its files by name, size and time, for its georeferencing, and for the mask."""
+        """Stands for its files by place, size and time, for its georeferencing, and the mask."""
         return digest(self.facts, *self.mask_facts)
 
     def read(self, with_footprint: bool) -> None:
