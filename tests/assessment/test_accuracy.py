@@ -99,13 +99,21 @@ class TestVerdict:
         assert verdict.log10_chance < -4
         assert verdict.summary()["chance"] < 1e-4
 
-    def test_where_larger_errors_are_allowed_the_windows_are_larger(self) -> None:
-        """Of an input with ten pixels for each that it was matched in, as far as they scatter."""
-        right = self.errors(normal_errors(9, 5.0), 9).of_inliers(20.0)
-        assert Assessment(test_points=right).judge(20.0).accepted
+    @pytest.mark.parametrize("limit_px", [5.0, 12.0, 20.0, 60.0])
+    def test_no_error_is_so_large_that_windows_confirm_it(self, limit_px: float) -> None:
+        """Points that were searched for nearby lie nearby, whatever the transform is."""
+        for seed in range(50):
+            far = np.random.default_rng(seed).uniform(-12.5, 12.5, (10, 2))
+            points = self.errors(far, 10).of_inliers(limit_px)
+            assert not Assessment(test_points=points).judge(limit_px).accepted
+
+    def test_windows_are_as_large_as_the_pixels_that_were_matched(self) -> None:
+        """Of an input with ten pixels for each that it was matched in."""
+        right = replace(self.errors(normal_errors(9, 5.0), 9), window_px=250.0)
+        assert Assessment(test_points=right.of_inliers(20.0)).judge(20.0).accepted
         for seed in range(50):
             far = np.random.default_rng(seed).uniform(-125, 125, (9, 2))
-            points = self.errors(far, 9).of_inliers(20.0)
+            points = replace(self.errors(far, 9), window_px=250.0).of_inliers(20.0)
             assert not Assessment(test_points=points).judge(20.0).accepted
 
     def test_a_point_that_cannot_be_placed_is_no_small_error(self) -> None:

@@ -6,16 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from affine import Affine
 from known_errors import DEGREES, GRID, PLAIN, shifted
-from raster_files import UTM
+from raster_files import UTM, write_raster
 from rasterio.crs import CRS
 
-from groundtie.assessment.measuring import measure_check_points, measure_tie_points
+from groundtie.assessment.measuring import matching_px, measure_check_points, measure_tie_points
 from groundtie.errors import GeoreferencingError, TooFewPointsError, TransformFileError
 from groundtie.geometry.tie_point_files import write_tie_points
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
+from groundtie.rasters.reading import open_raster
 
 
 def tie_points(transform: Transform, error_px: np.ndarray) -> TiePoints:
@@ -31,6 +33,18 @@ def tie_points(transform: Transform, error_px: np.ndarray) -> TiePoints:
         is_check=np.arange(count) % 3 == 0,
         state=np.where(np.arange(count) == 1, "rejected: far", "used"),
     )
+
+
+@pytest.mark.parametrize(("size_m", "expected"), [(100.0, 10.0), (10.0, 1.0), (2.0, 1.0)])
+def test_images_are_matched_in_pixels_of_the_coarser(
+    tmp_path: Path, size_m: float, expected: float
+) -> None:
+    """The input's pixels are 10 m a side."""
+    grid = Grid(Affine(size_m, 0, 500_000, 0, -size_m, 5_300_000), UTM, 30, 20)
+    path = write_raster(tmp_path / "r.tif", np.ones((20, 30), np.uint8), grid)
+    with open_raster(path) as reference:
+        assert matching_px(shifted(37.0, -24.0), reference) == pytest.approx(expected)
+    assert matching_px(shifted(37.0, -24.0), None) == 1
 
 
 class TestFiles:

@@ -102,7 +102,7 @@ class Assessment:
         name, judged, chance = "check points", self.check_points, math.nan
         if not len(judged):
             name, judged = "test points", self.test_points
-            chance = judged.log10_chance(max_error_px)
+            chance = judged.log10_chance
         if not len(judged):
             raise TooFewPointsError(NONE_HELD_OUT)
         px, metres = judged.in_pixels, judged.in_metres

@@ -24,7 +24,7 @@ from ..rasters.reading import RasterSource
 from ..registration.stored_transform import load_stored, transform_of
 from .accuracy import Assessment
 from .consistency import Leg, consistency
-from .point_errors import PointErrors
+from .point_errors import WINDOW_PX, PointErrors
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,14 @@ class AssessmentFiles:
         require_both_or_none(crs, input.grid.crs, f"{input.path} and the reference")
         return Transform.nominal(crs, input.grid)
 
-    def measure(self, found: Transform, max_error_px: float | None) -> Assessment:
+    def measure(
+        self, found: Transform, max_error_px: float | None, reference: RasterSource | None
+    ) -> Assessment:
         """Measure a transform by all evidence there is."""
         parts: dict[str, PointErrors] = {}
         if self.tie_points is not None:
-            measured = measure_tie_points(self.tie_points, found, max_error_px)
+            window_px = WINDOW_PX * matching_px(found, reference)
+            measured = measure_tie_points(self.tie_points, found, max_error_px, window_px)
             parts["control_points"], parts["test_points"] = measured
         if self.check_points is not None:
             parts["check_points"] = measure_check_points(self.check_points, found, self.tie_points)
@@ -107,15 +110,35 @@ def _leg(path: Path, reverse: bool = False) -> Leg:
     return Leg(str(path), load_transform(path), reverse)
 
 
+def matching_px(transform: Transform, reference: RasterSource | None) -> float:
+    """Return how many pixels of the input one is that both images are matched in.
+
+    That of the coarser image; of the input where the reference is not known.
+    """
+    if reference is None:
+        return 1.0
+    grid = reference.grid
+    middle = (np.array(grid.size) - 1) / 2
+    to_input = transform.of_map(grid.crs)
+    first, right, down = to_input(grid.pixel_to_map(middle + [[0, 0], [1, 0], [0, 1]]))
+    sides = np.hypot(*np.subtract([right, down], first).T)
+    # Where the middle lies nowhere, nothing is known.
+    return max(1.0, *sides[np.isfinite(sides)].tolist())
+
+
 def measure_tie_points(
-    path: Path, transform: Transform, max_error_px: float | None = None
+    path: Path,
+    transform: Transform,
+    max_error_px: float | None = None,
+    window_px: float = WINDOW_PX,
 ) -> tuple[PointErrors, PointErrors]:
     """Measure a transform at its control points and at its test points, in a file of tie points.
 
-    Control points have the role "fit", test points the role "check". Raises as `read_points`.
+    Control points have the role "fit", test points the role "check"; these were searched for in
+    windows of such a side, in input pixels. Raises as `read_points`.
     """
     points = read_points(path, transform)
-    test = _errors(transform, points, points.check)
+    test = replace(_errors(transform, points, points.check), window_px=window_px)
     control = _errors(transform, points, points.fit)
     return control, test.of_inliers(max_error_px)
 

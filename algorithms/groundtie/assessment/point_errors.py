@@ -19,8 +19,8 @@ from ..rasters.grid import FloatArray, Grid, metres_per_unit_at
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
-# Search window of held-out points, in pixels², if residuals do not show a larger one.
-_WINDOW_AREA_PX2 = (2 * CHECK_RADIUS_PX + 1) ** 2
+# Side of the windows in which held-out points are searched for, in matching pixels.
+WINDOW_PX = 2.0 * CHECK_RADIUS_PX + 1
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,8 @@ class PointErrors:
     error_m
         Where the registered input shows the points minus where they are, metres along the axes
         of the reference map, shape (n, 2); None if there are no metres.
+    window_px
+        Side of the windows in which the points were searched for.
     """
 
     position_px: FloatArray
@@ -47,6 +49,7 @@ class PointErrors:
     is_check: Mask
     counted: Mask
     error_m: FloatArray | None = None
+    window_px: float = WINDOW_PX
 
     @classmethod
     def of(cls, transform: Transform, reference_xy: ArrayLike, input_px: ArrayLike) -> PointErrors:
@@ -84,7 +87,9 @@ class PointErrors:
     def concatenate(cls, parts: Sequence[PointErrors]) -> PointErrors:
         """Return the errors in pixels of all parts, one after the other."""
         names = ("position_px", "error_px", "is_check", "counted")
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        columns = ([getattr(part, name) for part in parts] for name in names)
+        position_px, error_px, is_check, counted = map(np.concatenate, columns)
+        return cls(position_px, error_px, is_check, counted)
 
     def __len__(self) -> int:
         return len(self.position_px)
@@ -132,24 +137,20 @@ class PointErrors:
         """Statistics in metres, along x and y of the reference map."""
         return Statistics.of(np.zeros((0, 2)) if self.error_m is None else self.error_m[self.used])
 
-    def log10_chance(self, max_error_px: float) -> float:
-        """Return log10 of the probability that random matches would agree as well; 0 of none.
+    @property
+    def log10_chance(self) -> float:
+        """log10 of the probability that random matches would agree as well; 0 of none.
 
         Within whatever radius is the least likely ([Moisan2004]).
         """
         if not self.placed.any():
             return 0.0
-        area = self._window_area_px2(max_error_px)
-        return min(log10_least_false_alarms(self.length_px, area, 0), 0.0)
+        return min(log10_least_false_alarms(self.length_px, self._window_area_px2, 0), 0.0)
 
-    def _window_area_px2(self, max_error_px: float) -> float:
-        """Return the area in which outliers fall anywhere: as errors show, or the usual windows.
-
-        These are larger, in pixels of the input, where larger errors than usual are allowed: of an
-        input finer than what it was matched in.
-        """
-        usual = _WINDOW_AREA_PX2 * max(max_error_px / USUAL_MAX_ERROR_PX, 1.0) ** 2
-        return max(usual, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
+    @property
+    def _window_area_px2(self) -> float:
+        """Area in which outliers fall anywhere: that of the windows, or as errors show."""
+        return max(self.window_px**2, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
 
     def of_inliers(self, max_error_px: float | None = None) -> PointErrors:
         """Return the errors of which only those of inliers count.
@@ -163,7 +164,7 @@ class PointErrors:
         if len(errors) == 0:
             return self
         limit = USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px
-        mixture = fit_mixture(errors, self._window_area_px2(limit), sigma_range_px(limit))
+        mixture = fit_mixture(errors, self._window_area_px2, sigma_range_px(limit))
         counted = np.zeros(len(self), bool)
         counted[which] = mixture.inliers
         return replace(self, counted=counted)

@@ -134,7 +134,8 @@ def assess(
         Path | None,
         RasterIn(
             label="Reference image",
-            help="For the report's pictures: the image whose georeferencing is right.",
+            help="The image whose georeferencing is right: for the report's pictures, and for the "
+            "verdict, as test points were searched for in windows of the coarser image's pixels.",
         ),
     ] = None,
     input: Annotated[
@@ -222,7 +223,7 @@ def assess(
         )
         progress.update(0.0, "measuring")
         found = files.registration(model, right, moving)
-        assessment = files.measure(found, max_error)
+        assessment = files.measure(found, max_error, right)
         verdict = None if max_error is None else assessment.judge(max_error)
         progress.update(0.3, "drawing")
         if report is not None and right is not None and moving is not None:

@@ -480,10 +480,6 @@
       <translation>Für mlmi: Zahl der Pixel des Fensters, die benutzt werden.</translation>
     </message>
     <message>
-      <source>For the report's pictures: the image whose georeferencing is right.</source>
-      <translation>Für die Bilder des Berichts: das Bild, dessen Georeferenz stimmt.</translation>
-    </message>
-    <message>
       <source>For the tools that register images.</source>
       <translation>Für die Werkzeuge, die Bilder registrieren.</translation>
     </message>
@@ -1814,6 +1810,10 @@
     <message>
       <source>The image whose georeferencing is right.</source>
       <translation>Das Bild, dessen Georeferenz stimmt.</translation>
+    </message>
+    <message>
+      <source>The image whose georeferencing is right: for the report's pictures, and for the verdict, as test points were searched for in windows of the coarser image's pixels.</source>
+      <translation>Das Bild, dessen Georeferenz stimmt: für die Bilder des Berichts und für das Urteil, denn Testpunkte wurden in Fenstern aus Pixeln des gröberen Bildes gesucht.</translation>
     </message>
     <message>
       <source>The image whose georeferencing is right; without one the mean displacement of all dates is zero.</source>
