@@ -12,6 +12,9 @@ from typing import TypeVar
 from .memo import Memo
 from .progress import SILENT, Progress
 
+# The most threads that may be asked for.
+MOST_WORKERS = 256
+
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -117,6 +117,12 @@ def file_state(path: Path | str) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
+def file_facts(path: Path | str) -> tuple[Any, ...]:
+    """Return place, size and time of a file, from whatever folder it is named; else the name."""
+    state = file_state(path)
+    return (str(path),) if state is None else (os.path.abspath(path), *state)
+
+
 def _facts(value: Any) -> Any:
     if isinstance(value, Path):
         state = file_state(value)

@@ -14,7 +14,7 @@ from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..rasters.atomic import SIDECARS
 from ..rasters.vrt import sources_of
-from ..runs import file_state
+from ..runs import file_facts
 from ..series.inputs import files_behind
 
 # What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
@@ -69,7 +69,7 @@ def _facts(path: Path) -> tuple[Any, ...]:
     """Return the absolute path, and size in bytes and time in nanoseconds of a file."""
     place = os.path.abspath(path)
     # A folder's own are no facts of the files in it.
-    return (place,) if path.is_dir() else (place, *(file_state(path) or ()))
+    return (place,) if path.is_dir() else file_facts(place)
 
 
 def _beside(path: Path, listed: Listed) -> Iterator[Path]:

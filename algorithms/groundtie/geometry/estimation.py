@@ -43,12 +43,12 @@ class Estimate:
         But for what is common to all. Nominal pixels, which the transform may scale and rotate,
         are others.
         """
-        to_reference = np.asarray(np.linalg.inv(self.transform.linear_on(grid)).T)
-        return tuple(partial(_scaled, fold, to_reference) for fold in self.fold_models)
+        matrix = self.transform.onto_reference(grid)
 
+        def onto(fold: PointFunction, px: FloatArray) -> FloatArray:
+            return np.asarray(fold(px) @ matrix)
 
-def _scaled(fold: PointFunction, by: FloatArray, px: FloatArray) -> FloatArray:
-    return np.asarray(fold(px) @ by)
+        return tuple(partial(onto, fold) for fold in self.fold_models)
 
 
 def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:

@@ -101,7 +101,7 @@ class TiePoints(Rows):
         """
         nominal = grid.map_to_pixel(self.nominal_xy(transform))
         missed = nominal - grid.map_to_pixel(transform.model(self.reference_xy))
-        return np.asarray(missed @ np.linalg.inv(transform.linear_on(grid)).T)
+        return np.asarray(missed @ transform.onto_reference(grid))
 
     def exchanged(self, reference_grid: Grid, input_grid: Grid) -> TiePoints:
         """Return the points, found with the roles of the images exchanged, in their own roles.

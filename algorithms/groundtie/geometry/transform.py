@@ -91,16 +91,17 @@ class Transform:
         xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
         return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
-    def linear_on(self, grid: Grid) -> FloatArray:
-        """Return how many nominal pixels of a grid one of its pixels becomes, (x, y), shape (2, 2).
+    def onto_reference(self, grid: Grid) -> FloatArray:
+        """Return the matrix, (2, 2), to multiply differences of nominal pixels, (n, 2), by.
 
-        From one side of the grid to the other, along columns and along rows; without heights.
+        So they are in a grid's pixels on the reference, which the transform may scale and rotate:
+        as from one side of the grid to the other, along columns and rows; without heights.
         """
         model = self.model.affine if isinstance(self.model, TerrainModel) else self.model
         size = np.array(grid.size, float)
         ends = (size - 1) / 2 + np.vstack([np.diag(-size), np.diag(size)]) / 2
         first, last = np.split(grid.map_to_pixel(model(grid.pixel_to_map(ends))), 2)
-        return np.asarray(((last - first) / size[:, None]).T)
+        return np.asarray(np.linalg.inv((last - first) / size[:, None]), np.float64)
 
     def inverse(self, px: ArrayLike) -> FloatArray:
         """Return the reference map positions of input pixels (col, row), (..., 2).

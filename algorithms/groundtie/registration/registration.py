@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Raster
 from ..call_paths import check_paths
-from ..context import threads
+from ..context import MOST_WORKERS, threads
 from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_points import TiePoints
@@ -58,7 +58,7 @@ _WARPED = RasterOut(help="The registered raster.", suffixes=(*GEOTIFF, VRT))
 _REPORT = FileOut(help="An HTML page.", suffixes=(".html",), numbers=True)
 _GRID = Choice(help="The grid of the registered raster.", choices=OUTPUT_GRIDS)
 _RESAMPLING = Choice(help="How pixels are interpolated.", choices=METHODS)
-_WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=256)
+_WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=MOST_WORKERS)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -29,7 +28,7 @@ from ..rasters.reading import RasterSource, open_raster
 from ..rasters.vrt import sources_of
 from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
-from ..runs import digest, file_state
+from ..runs import digest, file_facts
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
@@ -99,7 +98,7 @@ class Date:
         """What its mask and the mask's place come from, as `facts`."""
         mask = self.listed.mask
         if mask is None:
-            return (file_facts(None),)
+            return (None,)
         if mask.is_raster:
             with open_raster(mask.mask) as source:
                 return raster_facts(mask.mask, source), mask.values
@@ -228,10 +227,3 @@ def parts_of_layer(layer: Any) -> list[Any]:
     if not isinstance(layer, Path) or layer.suffix.lower() != ".shp":
         return [layer]
     return [layer, *(layer.with_suffix(ending) for ending in _PARTS_OF_SHAPEFILE)]
-
-
-def file_facts(path: Path | str | None) -> tuple[Any, ...]:
-    """Return place, size and time of the last change of a file; of another, its name."""
-    state = None if path is None else file_state(path)
-    # A file is the same from whatever folder it is named.
-    return (str(path),) if path is None or state is None else (os.path.abspath(path), *state)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
+from ...context import MOST_WORKERS
 from ...kinds import Band, Choice, Distance, FileOut, Number, RasterIn, RasterOut, Text
 from ...rasters.warping import METHODS
 
@@ -47,7 +48,7 @@ _THREADS = Number(
     help="Number of threads; by default one per processor.",
     integer=True,
     minimum=1,
-    maximum=256,
+    maximum=MOST_WORKERS,
     common=True,
 )
 Workers = Annotated[int | None, _THREADS]
