@@ -1,0 +1,87 @@
+"""What the dock registers to where there is no raster: the map, and what it is made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from desktops import Desktop, pair
+from noise_pairs import ORIGIN
+
+
+def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
+    from groundtie_qgis.reference_export import with_files
+
+    reference, input = pair(tmp_path, desktop)
+    desktop.refresh()
+    made, values = with_files(None, input, desktop.canvas)
+    assert made.isValid()
+    assert made.crs() == input.crs()
+    assert values["INPUT"] == input.id()
+    assert made.rasterUnitsPerPixelX() == pytest.approx(1, rel=0.01)
+    assert made.extent().contains(input.extent())
+    # What is drawn there is what lies there.
+    with rasterio.open(made.source()) as drawn, rasterio.open(reference.source()) as ground:
+        place = [(ORIGIN[0] + x + 0.5, ORIGIN[1] - y - 0.5) for x, y in ((50, 60), (200, 300))]
+        there = np.array([values[0] for values in drawn.sample(place)], float)
+        truth = np.array([values[0] for values in ground.sample(place)], float)
+    # The stretch is linear: order and sign of differences stay.
+    assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
+
+
+ZOOM, TILES = 16, 3
+
+
+def write_tiles(folder: Path, centre: tuple[float, float]) -> tuple[int, int]:
+    """Write a web map's tiles around a place in EPSG:3857: red grows by 1 a column, green a row.
+
+    Returns the column and row of the whole map, in pixels, at which they begin.
+    """
+    side = 2 * np.pi * 6378137 / 2**ZOOM
+    middle = np.array([centre[0], -centre[1]]) / side + 2 ** (ZOOM - 1)
+    first = np.floor(middle).astype(int) - TILES // 2
+    for x in range(first[0], first[0] + TILES):
+        for y in range(first[1], first[1] + TILES):
+            columns, rows = (
+                np.arange(256) + 256 * (n - f) for n, f in zip((x, y), first, strict=True)
+            )
+            bands = np.zeros((3, 256, 256), "uint8")
+            bands[0], bands[1] = (columns % 250)[None], (rows % 250)[:, None]
+            path = folder / str(ZOOM) / str(x) / f"{y}.png"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            profile = {"driver": "PNG", "dtype": "uint8", "count": 3, "width": 256, "height": 256}
+            with rasterio.open(path, "w", **profile) as tile:
+                tile.write(bands)
+    return int(256 * first[0]), int(256 * first[1])
+
+
+@pytest.mark.filterwarnings("ignore:Dataset has no geotransform")
+def test_a_web_map_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
+    """Its tiles are drawn where they lie, over the input's extent with the input's pixel size."""
+    from groundtie_qgis.reference_export import with_files
+    from qgis.core import QgsProject, QgsRasterLayer
+    from rasterio.warp import transform
+
+    _, input = pair(tmp_path, desktop)
+    xy = np.array(
+        [(ORIGIN[0] + x + 0.5, ORIGIN[1] - y - 0.5) for x in (40, 300) for y in (60, 200)]
+    )
+    mercator = np.transpose(transform("EPSG:32633", "EPSG:3857", *xy.T))
+    begins = write_tiles(tmp_path / "tiles", tuple(mercator[0]))
+    source = f"type=xyz&url=file://{tmp_path}/tiles/{{z}}/{{x}}/{{y}}.png&zmin={ZOOM}&zmax={ZOOM}"
+    tiles = QgsRasterLayer(source, "web", "wms")
+    assert tiles.isValid()
+    QgsProject.instance().addMapLayer(tiles)
+    made, values = with_files(tiles, input, desktop.canvas)
+    assert values == {"REFERENCE": made.source(), "INPUT": input.id()}
+    assert made.extent().contains(input.extent())
+    assert made.rasterUnitsPerPixelX() == pytest.approx(1, rel=0.01)
+    pixel = 2 * np.pi * 6378137 / 2**ZOOM / 256
+    truth = mercator * [1, -1] / pixel + 2 ** (ZOOM - 1) * 256 - begins - 0.5
+    with rasterio.open(made.source()) as drawn:
+        seen = np.array([values[:2] for values in drawn.sample(xy)], float)
+    away = (truth % 250 > 5) & (truth % 250 < 245)  # from where the colours begin anew
+    assert away.sum() >= 6
+    np.testing.assert_allclose(seen[away], (truth % 250)[away], atol=1.5)
