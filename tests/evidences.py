@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from groundtie.geometry.model_choice import left_out_blocks
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
+from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.rest import Rest
@@ -138,6 +140,8 @@ def facts(
     is_in_sensor_geometry: bool = False,
     has_colours: bool = False,
     has_pixel_size: bool = True,
+    has_chosen_band: bool = False,
+    band_shifts: Sequence[BandShift] = (),
 ) -> ImageFacts:
     """Return facts about an image that need no image: by default a camera's, of fields."""
     found = ImageFacts(None, None)  # type: ignore[arg-type]
@@ -148,6 +152,8 @@ def facts(
         is_in_sensor_geometry=is_in_sensor_geometry,
         has_colours=has_colours,
         has_pixel_size=has_pixel_size,
+        has_chosen_band=has_chosen_band,
+        band_shifts=band_shifts,
     )
     return found
 

@@ -11,7 +11,7 @@ from affine import Affine
 from groundtie.rasters.grid import compose
 
 from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, as_text, direction
-from .pairs import Pair
+from .pairs import Pair, join, to_bytes
 
 
 def mirrored(pair: Pair, setting: Setting) -> Pair:
@@ -120,7 +120,20 @@ def other_place(pair: Pair, setting: Setting) -> Pair:
     return setting.elsewhere(pair)
 
 
+def bands_apart(pair: Pair, setting: Setting) -> Pair:
+    """Two of three bands show the ground elsewhere than the first, whose place counts."""
+    rng = setting.rng
+    shift, further = direction(rng, 0.0, 12.0), direction(rng, 5.0, 15.0)
+    stays, moves = pair.moved(shift, as_text(shift)), pair.moved(shift + further)
+    bands = [stays.input[:1], *(np.resize(moves.input, (2, *moves.input.shape[1:]))[:, None])]
+    gains = 1.0, *rng.uniform(0.6, 1.0, 2)
+    made = [to_bytes(gain * band) for gain, band in zip(gains, bands, strict=True)]
+    note = f"bands 2 and 3 {np.hypot(*further):.1f} px off band 1"
+    return replace(stays, input=np.concatenate(made), note=join(stays.note, note))
+
+
 ATTACKS = [
+    Attack(PLACEMENT, "bands apart", "", bands_apart),
     Attack(PLACEMENT, "mirrored", "", mirrored),
     Attack(PLACEMENT, "turned", "", turned),
     Attack(PLACEMENT, "tiny overlap", "", tiny_overlap),

@@ -43,6 +43,7 @@ from groundtie.errors import (
 )
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.used import GROUND, SURFACE, MaskUsed
+from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.rest import Rest
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
@@ -62,6 +63,7 @@ from groundtie.registration.verdict import refusals
 
 RANK = (
     stages.TIE_POINTS,
+    stages.BANDS,
     stages.IMAGES,
     stages.SEARCH,
     stages.ASSESSMENT,
@@ -131,6 +133,12 @@ RANDOM = np.random.default_rng(7)
 ANYWHERE = RANDOM.uniform(0, 499, (50, 2))
 
 
+def bands_apart(px: float) -> ImagesEvidence:
+    """Return the evidence of an input of which two bands are so far apart."""
+    displaced = facts(band_shifts=[BandShift((1, 2), px)])
+    return ImagesEvidence(scene(input=displaced), MaskUsed.none(""), 3.0)
+
+
 # Of each rule: evidence that it refuses, and evidence that it does not.
 EVIDENCE: dict[str, tuple[Any, Any]] = {
     # 50 points within n px of a line: of 600 px, 60 px are a tenth.
@@ -142,9 +150,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         stored(ANYWHERE, RANDOM.uniform(0, 499, (50, 2)) - ANYWHERE),
         stored(ANYWHERE, 20 * RANDOM.normal(size=(50, 2))),
     ),
+    "bands apart": (bands_apart(3.1), bands_apart(2.9)),
     "ground not found": (
-        ImagesEvidence(DESPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town")),
-        ImagesEvidence(SPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town")),
+        ImagesEvidence(DESPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town"), 3.0),
+        ImagesEvidence(SPECKLED, MaskUsed(GROUND, "reference", 0.3, "as in a town"), 3.0),
     ),
     "second place": (
         SearchEvidence(AmbiguousPlaceError("two places match about as well")),
@@ -295,9 +304,10 @@ def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
 
 def test_only_rules_of_the_evidence_are_asked() -> None:
     """Rules of agreement and error judge refinements, too; those of scenes do not."""
-    assert ImagesEvidence.stages == (stages.IMAGES,)
+    assert ImagesEvidence.stages == (stages.BANDS, stages.IMAGES)
     assert SearchEvidence.stages == (stages.SEARCH,)
     assert RegistrationEvidence.stages == (
+        stages.BANDS,
         stages.IMAGES,
         stages.AGREEMENT,
         stages.ERROR,
@@ -307,6 +317,7 @@ def test_only_rules_of_the_evidence_are_asked() -> None:
     assert RefinementEvidence.stages == (stages.AGREEMENT, stages.ERROR, stages.REFINEMENT)
     assert PoseEvidence.stages == (stages.POSE,)
     assert PoseSurveyEvidence.stages == (
+        stages.BANDS,
         stages.AGREEMENT,
         stages.ERROR,
         stages.SURVEY,

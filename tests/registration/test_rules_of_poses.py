@@ -13,13 +13,16 @@ from evidences import (
     GRID,
     displaced,
     estimated,
+    facts,
     fallen,
     fit_points,
     refusing,
     scatter,
+    scene,
     survey,
 )
 
+from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
@@ -50,7 +53,7 @@ def posed(
         fitted.transform,
         **{"fold_models": fitted.fold_models, **more},
     )
-    return PoseSurveyEvidence(found, layover_factor, is_shift)
+    return PoseSurveyEvidence(found, scene(), layover_factor, is_shift)
 
 
 def fallen_beyond(count: int) -> np.ndarray:
@@ -63,6 +66,15 @@ def fallen_beyond(count: int) -> np.ndarray:
 def test_poses_of_canopies_are_refused(rival: float, expected: list[str]) -> None:
     ground = survey(height=2.0, rival=rival)
     assert refusing(posed(scatter(21, 0.5), ground=ground)) == expected
+
+
+@pytest.mark.parametrize(("apart_px", "expected"), [(5.1, ["bands apart"]), (4.9, [])])
+def test_poses_of_bands_that_are_displaced_are_refused(
+    apart_px: float, expected: list[str]
+) -> None:
+    displaced_bands = facts(band_shifts=[BandShift((1, 2), apart_px)])
+    found = replace(posed(scatter(21, 0.5)), scene=scene(input=displaced_bands))
+    assert refusing(found) == expected
 
 
 @pytest.mark.parametrize(

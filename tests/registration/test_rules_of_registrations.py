@@ -27,6 +27,7 @@ from evidences import (
 from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
+from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
@@ -266,7 +267,7 @@ def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
 )
 def test_a_layer_is_believed_where_there_is_no_speckle(kind: str, expected: list[str]) -> None:
     despeckled = scene(facts(is_known_radar=True, strong_share=0.25))
-    assert refusing(ImagesEvidence(despeckled, masked(kind))) == expected
+    assert refusing(ImagesEvidence(despeckled, masked(kind), 3.0)) == expected
     assert refusing(evidence(GOOD, scene=despeckled, mask=masked(kind))) == expected
 
 
@@ -278,7 +279,21 @@ def test_the_ground_of_a_town_is_not_found_in_pixels_of_unknown_size(
     variation2: float, has_pixel_size: bool, expected: list[str]
 ) -> None:
     town = facts(variation2, strong_share=0.25, has_pixel_size=has_pixel_size)
-    assert refusing(ImagesEvidence(scene(town), masked(NONE))) == expected
+    assert refusing(ImagesEvidence(scene(town), masked(NONE), 3.0)) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "has_chosen_band", "expected"),
+    [("input", False, ["bands apart"]), ("input", True, ["bands apart"])]
+    + [("reference", False, ["bands apart"]), ("reference", True, [])],
+)
+def test_bands_of_the_reference_may_be_apart_if_one_is_chosen(
+    name: str, has_chosen_band: bool, expected: list[str]
+) -> None:
+    """Of the input, all bands are registered."""
+    displaced = facts(has_chosen_band=has_chosen_band, band_shifts=[BandShift((2, 3), 9.0)])
+    assert refusing(ImagesEvidence(scene(**{name: displaced}), masked(NONE), 3.0)) == expected
+    assert refusing(evidence(GOOD, scene=scene(**{name: displaced}))) == expected
 
 
 @pytest.mark.parametrize(("agreeing", "is_needed"), [(5, True), (6, False), (9, False)])

@@ -33,9 +33,10 @@ from .scene import SceneInfo
 from .surface_masks import ModelFit
 
 # Stages of a registration, in the order in which their rules are asked.
-TIE_POINTS, IMAGES, SEARCH, ASSESSMENT = "tie points", "images", "search", "assessment"
-POSE, AGREEMENT, ERROR, SCENE = "pose", "agreement", "error", "scene"
-SURVEY, REFINEMENT, SERIES = "survey", "refinement", "series"
+TIE_POINTS, BANDS, IMAGES, SEARCH = "tie points", "bands", "images", "search"
+ASSESSMENT, POSE, AGREEMENT = "assessment", "pose", "agreement"
+ERROR, SCENE, SURVEY = "error", "scene", "survey"
+REFINEMENT, SERIES = "refinement", "series"
 
 
 class Evidence(Protocol):
@@ -43,6 +44,23 @@ class Evidence(Protocol):
 
     @property
     def stages(self) -> Collection[str]: ...
+
+
+class EvidenceOfBands(Evidence, Protocol):
+    """Evidence of which the bands of the images are a part.
+
+    Parameters
+    ----------
+    scene
+        What the images are.
+    max_error_px
+        Largest error that is accepted, in matching pixels.
+    """
+
+    @property
+    def scene(self) -> SceneInfo: ...
+    @property
+    def max_error_px(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -55,12 +73,15 @@ class ImagesEvidence:
         What the images are.
     mask
         What takes part.
+    max_error_px
+        Largest error that is accepted, in matching pixels.
     """
 
     scene: SceneInfo
     mask: MaskUsed
+    max_error_px: float
 
-    stages: ClassVar = (IMAGES,)
+    stages: ClassVar = (BANDS, IMAGES)
 
 
 @dataclass(frozen=True)
@@ -234,7 +255,7 @@ class RegistrationEvidence:
     input_fit: ModelFit | None = None
     exchanged: Agreement | None = None
 
-    stages: ClassVar = (IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
+    stages: ClassVar = (BANDS, IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
     judged: ClassVar = "the registration"
 
     @property

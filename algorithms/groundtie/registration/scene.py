@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_o
 from ..masks.scene import Scene
 from ..masks.town import PERHAPS_TOWN_SHARE, TOWN_SHARE, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
+from ..matching.band_shifts import BandShift, band_shifts
 from ..matching.locked import Sensors
 from ..rasters.grid import PointFunction
 from ..rasters.pair import Image, ImagePair
@@ -73,6 +75,18 @@ class ImageFacts:
     def has_colours(self) -> bool:
         """Whether its bands make classes of colour, by which a town's ground is matched."""
         return self.image.has_colours
+
+    @cached_property
+    def has_chosen_band(self) -> bool:
+        """Whether the user chose the band that is matched."""
+        return self.image.band is not None
+
+    @cached_property
+    def band_shifts(self) -> Sequence[BandShift]:
+        """Bands that are displaced against the one before, by how many matching pixels."""
+        scale = self.image.source.grid.pixel_size_m / self.scene.grid.pixel_size_m
+        found = band_shifts(self.image.source)
+        return [replace(one, apart_px=one.apart_px * scale) for one in found]
 
     @property
     def has_speckle(self) -> bool:

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from ..evidence import (
     AGREEMENT,
     ASSESSMENT,
+    BANDS,
     ERROR,
     IMAGES,
     POSE,
@@ -29,6 +30,7 @@ from ..evidence import (
 )
 from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
+from .bands import BANDS_RULES
 from .error import ERROR_RULES
 from .images import IMAGES_RULES
 from .pose import POSE_RULES
@@ -45,6 +47,7 @@ __all__ = ["RULES", "Rule"]
 # By the stage whose evidence they read, in the order in which they are asked.
 RULES: Mapping[str, tuple[Rule, ...]] = {
     TIE_POINTS: TIE_POINT_RULES,
+    BANDS: BANDS_RULES,
     IMAGES: IMAGES_RULES,
     SEARCH: SEARCH_RULES,
     ASSESSMENT: ASSESSMENT_RULES,

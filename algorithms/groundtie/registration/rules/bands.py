@@ -1,0 +1,35 @@
+"""Rules on bands, which one transform registers: asked of every pair, and of poses, too."""
+
+from __future__ import annotations
+
+from ...masks.used import INPUT, REFERENCE
+from ..evidence import EvidenceOfBands
+from .rule import Rule
+
+
+def _bands_apart(evidence: EvidenceOfBands) -> str | None:
+    scene = evidence.scene
+    # A chosen band of the reference is matched alone; of the input, all are registered.
+    sought = {INPUT: scene.input}
+    if not scene.reference.has_chosen_band:
+        sought[REFERENCE] = scene.reference
+    for name, facts in sought.items():
+        for shift in facts.band_shifts:
+            if shift.apart_px > evidence.max_error_px:
+                one, other = shift.bands
+                off = f"show the ground {shift.apart_px:.1f} px apart"
+                return f"bands {one} and {other} of the {name} {off}"
+    return None
+
+
+BANDS_RULES: tuple[Rule, ...] = (
+    Rule(
+        "bands apart",
+        "a band of the input, or of a reference all of whose bands are matched, shows the ground "
+        "farther from where the band before it does than the largest error",
+        "the user's largest error",
+        "register the bands to one another first, or give an image of one band",
+        _bands_apart,
+        is_final=True,
+    ),
+)

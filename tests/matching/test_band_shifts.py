@@ -1,0 +1,103 @@
+"""Bands of one file that show the ground at other pixels than the band before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raster_files import write_raster
+from textured_pairs import texture
+
+from groundtie.matching.band_shifts import BandShift, band_shifts
+from groundtie.rasters.reading import open_raster
+
+SHIFT = (-4, 9)
+
+
+def found_in(path: Path) -> list[BandShift]:
+    with open_raster(path) as source:
+        return list(band_shifts(source))
+
+
+def moved(band: np.ndarray, shift: tuple[int, int] = SHIFT) -> np.ndarray:
+    """Return a band whose content lies rows and columns further on."""
+    return np.roll(band, shift, axis=(0, 1))
+
+
+@pytest.fixture
+def bands() -> np.ndarray:
+    """Return three bands of one ground, of other contrast and with noise of their own."""
+    ground, rng = 128 + 40 * texture(400, 420), np.random.default_rng(4)
+    noise = 3 * rng.normal(size=(3, 400, 420))
+    return np.stack([ground, 255 - 0.7 * ground, 20 + 0.4 * ground]) + noise
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_band_that_was_moved_is_found_and_how_far(
+    bands: np.ndarray, number: int, tmp_path: Path
+) -> None:
+    bands[number - 1] = moved(bands[number - 1])
+    found = found_in(write_raster(tmp_path / "i.tif", bands.astype(np.float32)))
+    neighbours = [pair for pair in ((1, 2), (2, 3)) if number in pair]
+    assert [one.bands for one in found] == neighbours
+    assert [one.apart_px for one in found] == pytest.approx(
+        [np.hypot(*SHIFT)] * len(found), abs=0.2
+    )
+
+
+def test_bands_at_their_place_are_not_displaced(bands: np.ndarray, tmp_path: Path) -> None:
+    assert found_in(write_raster(tmp_path / "i.tif", bands.astype(np.float32))) == []
+
+
+def test_bands_of_noise_or_of_nothing_are_not_displaced(tmp_path: Path) -> None:
+    noise = np.random.default_rng(5).normal(100, 20, size=(5, 200, 300))
+    noise[3] = 7
+    assert found_in(write_raster(tmp_path / "i.tif", noise.astype(np.float32))) == []
+
+
+def test_the_edges_of_nodata_hide_no_shift(bands: np.ndarray, tmp_path: Path) -> None:
+    """All bands have the same wedge without data, which is not moved."""
+    bands[2] = moved(bands[2])
+    rows, cols = np.indices(bands.shape[1:])
+    bands[:, rows + cols < 250] = 0
+    path = write_raster(tmp_path / "i.tif", bands.astype(np.float32), nodata=0)
+    (found,) = found_in(path)
+    assert found.bands == (2, 3) and found.apart_px == pytest.approx(np.hypot(*SHIFT), abs=0.2)
+
+
+@pytest.mark.parametrize("shape", [(1, 300, 300), (3, 20, 300)])
+def test_one_band_and_strips_are_not_compared(shape: tuple[int, ...], tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "i.tif", np.ones(shape, np.uint8))
+    assert found_in(path) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "so-cloudy-sentinel/s2_cloudfree_ROIs1970_fall_139_p839.tif",
+        "so-cloudy-sentinel/s2_cloudy_ROIs1970_fall_139_p839.tif",
+        "so-cloudy-sentinel/ROIs1970_fall_139_p839.tif",
+        "so-sentinel/S2_patch11.tif",
+        "oo-burn/burn_1986.png",
+        "dn-1/DN1a.png",
+        "oi-3/IO3b.png",
+        "so-forest-river/SO3a.png",
+        "rpc-ventoux/lowres_color_image.tif",
+    ],
+)
+def test_bands_of_real_images_are_not_displaced(name: str, real_data: Path) -> None:
+    assert found_in(real_data / name) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["so-delta/SO1a.png", "so-dense-urban/optical_ref.png", "oo-port/OO4a.png"]
+)
+def test_displaced_bands_of_real_images_are_found(
+    name: str, real_data: Path, tmp_path: Path
+) -> None:
+    with open_raster(real_data / name) as source:
+        bands, _ = source.read_bands(source.window, (1, 2, 3))
+    bands[2] = moved(bands[2], (5, -4))
+    (found,) = found_in(write_raster(tmp_path / "i.tif", bands))
+    assert found.bands == (2, 3) and found.apart_px == pytest.approx(np.hypot(5, 4), abs=0.5)
