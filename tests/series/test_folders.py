@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rasterio
 from affine import Affine
 from raster_files import UTM, write_raster
 from rasterio.crs import CRS
+from rasterio.windows import Window
 from textured_pairs import texture
 
 from groundtie.errors import NotRegisteredError
@@ -118,3 +122,31 @@ def test_a_series_that_is_refused_leaves_the_files_of_others(
     with pytest.raises(NotRegisteredError):
         coregister_series(out, [dates])
     assert [path.name for path in out.iterdir()] == ["series.csv"]
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def blacken(path: Path) -> None:
+    """Set pixels to 0: the file's tags stay."""
+    with rasterio.open(path, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as dataset:
+        dataset.write(np.zeros((1, 20, 20), dataset.dtypes[0]), window=Window(0, 0, 20, 20))
+
+
+@pytest.mark.parametrize("damage", [truncate, blacken, Path.unlink])
+def test_a_raster_that_was_changed_since_is_made_again(
+    tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
+    out, dates = tmp_path / "out", dates_at(tmp_path / "dates", UTM, 500_000, "a", "b")
+    coregister_series(out, [dates])
+    files = [out / f"{name}_registered.cog.tif" for name in "ab"]
+    before = [file.read_bytes() for file in files]
+    damage(files[0])
+    untouched = files[1].stat().st_mtime_ns
+    assert coregister_series(out, [dates]).registered_pairs == 0
+    assert [file.read_bytes() for file in files] == before
+    assert files[1].stat().st_mtime_ns == untouched
+    times = [file.stat().st_mtime_ns for file in files]
+    coregister_series(out, [dates])
+    assert [file.stat().st_mtime_ns for file in files] == times

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
 from .frame import FloatArray, sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
-from .stored import SERIES_JSON, StoredSeries, forget_unfinished
+from .stored import SERIES_JSON, StoredSeries, forget_unfinished, state_of
 
 TABLE_CSV, TABLE_GPKG = "series.csv", "series.gpkg"
 
@@ -64,7 +65,8 @@ class SeriesFiles:
             forget_unfinished(self.folder)
             raise _refusal(series)
         make_folder(self.folder)
-        with Outputs() as outputs:
+        outputs = _PlacedOutputs()
+        with outputs:
             series = self._with_rasters(series, stored, outputs, context)
             write_csv(outputs.stage(self.folder / TABLE_CSV), TABLE_COLUMNS, series.rows())
             _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
@@ -82,7 +84,7 @@ class SeriesFiles:
         return digest(facts, __version__)
 
     def _with_rasters(
-        self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
+        self, series: Series, stored: StoredSeries, outputs: _PlacedOutputs, context: Context
     ) -> Series:
         """Write the rasters that are not there yet, and return what the series has then."""
         dates, written, items = [], {}, []
@@ -106,25 +108,26 @@ class SeriesFiles:
         one: SeriesDate,
         series: Series,
         stored: StoredSeries,
-        outputs: Outputs,
+        outputs: _PlacedOutputs,
         context: Context,
     ) -> tuple[SeriesDate, dict[str, Any], Grid]:
         assert one.date is not None and one.transform is not None
         key, before = self.raster_key(one, series), stored.dates.get(one.name)
-        if before is not None and before.key == key and before.is_there(self.folder):
+        if before is not None and before.key == key and before.is_untouched(self.folder):
             corners = one.transform.input_grid.outline(2)
             moved = one.transform(before.transform.inverse(corners)) - corners
             # What untouched pixels may be wrong by, too.
             if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
                 has_written(self.folder / before.file)
-                known = {"file": before.file, "key": key, "run": before.run}
+                known = _known(before.file, key, before.run, before.state)
                 with open_raster(self.folder / before.file) as source:
                     return replace(one, transform=before.transform), known, source.grid
         context.update(0.0, f"writing {one.name}")
         path = self.folder / f"{one.name}_registered.cog.tif"
         output = RegisteredOutput(path, self.output_grid, self.resampling)
         grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
-        return one, {"file": path.name, "key": key, "run": run_tags().get(RUN)}, grid
+        state = state_of(outputs.places[path])
+        return one, _known(path.name, key, run_tags().get(RUN), state), grid
 
     def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
         """Return the STAC item of a registered date; empty where there can be none."""
@@ -155,7 +158,7 @@ class SeriesFiles:
         """Remove rasters of dates that are left out now: they must not seem to be registered."""
         current = {one["file"] for one in series.written.values()}
         for one in stored.dates.values():
-            if one.file not in current and one.is_there(self.folder):
+            if one.file not in current and one.is_own(self.folder):
                 with writing(self.folder / one.file):
                     (self.folder / one.file).unlink()
 
@@ -166,6 +169,28 @@ class SeriesFiles:
             for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
                 with writing(self.folder / name):
                     (self.folder / name).unlink(missing_ok=True)
+
+
+class _PlacedOutputs(Outputs):
+    """Outputs of which is known where they lie until they are complete.
+
+    Renaming changes neither size nor time of a file: `series.json` can state those of rasters that
+    get their final names together with it.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.places: dict[Path, Path] = {}
+
+    def stage(self, path: str | os.PathLike[str]) -> Path:
+        """Return the name under which to write an output for now, and keep it."""
+        self.places[Path(path)] = staged = super().stage(path)
+        return staged
+
+
+def _known(file: str, key: str, run: str | None, state: str | None) -> dict[str, Any]:
+    """Return what the next run is told of a raster (see `StoredDate`)."""
+    return {"file": file, "key": key, "run": run, "state": state}
 
 
 def _write_layer(path: Path, series: Series) -> None:

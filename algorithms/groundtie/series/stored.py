@@ -20,7 +20,7 @@ from ..geometry.transform import Transform
 from ..rasters.atomic import make_folder, writing
 from ..rasters.hidden_files import remove
 from ..rasters.reading import open_raster
-from ..runs import RUN_TAG
+from ..runs import RUN_TAG, digest, file_state
 from ..strict_json import parse_json, read_json
 from .frame import SeriesFrame
 from .pairs import PairResult
@@ -41,6 +41,8 @@ class StoredDate:
         Stands for what it was made of and how, but for the transform.
     run
         The id of the call that wrote it (see `runs`).
+    state
+        Stands for its size and time as it was written (see `state_of`); None: not known.
     transform
         By which it was made.
     """
@@ -48,10 +50,15 @@ class StoredDate:
     file: str
     key: str
     run: str | None
+    state: str | None
     transform: Transform
 
-    def is_there(self, folder: Path) -> bool:
-        """Return whether the file is there, as that call wrote it."""
+    def is_untouched(self, folder: Path) -> bool:
+        """Return whether the file is there, as that call left it."""
+        return self.state is not None and state_of(folder / self.file) == self.state
+
+    def is_own(self, folder: Path) -> bool:
+        """Return whether the file is there and of that call, whatever became of it since."""
         try:
             with open_raster(folder / self.file) as source:
                 found = source.tags.get("", {}).get(RUN_TAG)
@@ -77,6 +84,13 @@ class StoredSeries:
     frames: Mapping[str | None, SeriesFrame] = field(default_factory=dict)
     pairs: Mapping[str, PairResult] = field(default_factory=dict)
     dates: Mapping[str, StoredDate] = field(default_factory=dict)
+
+
+def state_of(path: Path) -> str | None:
+    """Return what stands for size and time of a file; None: there is none."""
+    state = file_state(path)
+    # Nanoseconds have more digits than numbers in JSON.
+    return None if state is None else digest(state)
 
 
 def keep_unfinished(
@@ -172,5 +186,6 @@ def _stored_date(values: dict[str, Any]) -> StoredDate:
         str(values["file"]),
         str(written["key"]),
         written["run"],
+        written.get("state"),  # earlier versions did not keep it
         Transform.from_json(values["transform"]),
     )
