@@ -9,6 +9,7 @@ from pathlib import Path
 import fiona
 import numpy as np
 import pytest
+import rasterio
 import rasterio.shutil
 from raster_files import utm_grid, write_raster
 from series_dates import FRAME
@@ -70,6 +71,43 @@ def test_georeferencing_that_a_sidecar_changes_is_another_date(
     sidecar(tmp_path / "b.tif", crs, left)
     after = keys(tmp_path, one_thread)
     assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+BAND = "<PAMDataset><PAMRasterBand band='1'>{}</PAMRasterBand></PAMDataset>"
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        BAND.format("<NoDataValue>7</NoDataValue>"),
+        BAND.format("<Scale>0.5</Scale>"),
+        BAND.format("<Offset>3</Offset>"),
+        BAND.format("<UnitType>dB</UnitType>"),
+        BAND.format("<Description>red</Description>"),
+        BAND.format("<Metadata><MDI key='A'>b</MDI></Metadata>"),
+        "<PAMDataset><Metadata><MDI key='A'>b</MDI></Metadata></PAMDataset>",
+    ],
+)
+def test_what_a_sidecar_states_of_the_pixels_makes_another_date(
+    tmp_path: Path, one_thread: Context, stated: str
+) -> None:
+    for name in "ab":
+        write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    before = keys(tmp_path, one_thread)
+    (tmp_path / "b.tif.aux.xml").write_text(stated)
+    after = keys(tmp_path, one_thread)
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def test_statistics_that_gdal_keeps_make_no_other_date(tmp_path: Path, one_thread: Context) -> None:
+    for name in "ab":
+        write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    before = keys(tmp_path, one_thread)
+    with rasterio.open(tmp_path / "b.tif") as dataset:
+        dataset.stats()
+    with rasterio.open(tmp_path / "b.tif") as dataset:
+        assert "STATISTICS_MEAN" in dataset.tags(1)
+    assert (tmp_path / "b.tif.aux.xml").exists() and keys(tmp_path, one_thread) == before
 
 
 @pytest.mark.parametrize("is_nested", [False, True])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -37,6 +37,12 @@ _FOOTPRINT_PX = 256
 
 # What states the place of a shapefile's shapes, and where they are in it.
 _PARTS_OF_SHAPEFILE = (".shx", ".prj")
+
+# The names of the tags in which GDAL keeps statistics.
+_STATISTICS = "STATISTICS_"
+
+# Domains of tags in which GDAL names the file, as it was named; of documents, as of a VRT's XML.
+_NAMING_DOMAINS = ("DERIVED_SUBDATASETS", "SUBDATASETS", "xml:")
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,7 @@ class Date:
 
     @cached_property
     def facts(self) -> tuple[Any, ...]:
-        """What its pixels and their place come from: all files behind it, and its grid."""
+        """What its pixels and their place come from: the files behind it, and what it states."""
         return raster_facts(self.listed.raster, self.source)
 
     @cached_property
@@ -206,9 +212,10 @@ def footprint_shares(polygons: Sequence[Any]) -> dict[frozenset[int], float]:
 
 
 def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
-    """Return what a raster's pixels and their place come from: all files behind it, and its grid.
+    """Return what a raster's pixels and their place come from: the files behind it, what it states.
 
-    Programs that show a raster write statistics into its `.aux.xml`: of that the grid counts.
+    Programs that show a raster write statistics into its `.aux.xml`: of that counts what else the
+    raster states by it.
 
     Parameters
     ----------
@@ -219,7 +226,23 @@ def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
     if isinstance(raster, Path):
         behind = [*source.files(), *map(str, sources_of(raster))]
     files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
-    return *map(file_facts, files), source.grid.to_json()
+    return *map(file_facts, files), source.grid.to_json(), *_stated(source)
+
+
+def _stated(source: RasterSource) -> tuple[Any, ...]:
+    """Return what a raster states of its pixels, but for statistics."""
+    bands = [{**vars(band), "tags": _without_statistics(band.tags)} for band in source.bands]
+    tags = [
+        (domain, _without_statistics(found))
+        for domain, found in sorted(source.tags.items())
+        if not domain.startswith(_NAMING_DOMAINS)
+    ]
+    masks = source.has_mask_band, source.has_masks_by_band
+    return bands, masks, source.colormap, tags
+
+
+def _without_statistics(tags: Mapping[str, str]) -> list[tuple[str, str]]:
+    return sorted(one for one in tags.items() if not one[0].startswith(_STATISTICS))
 
 
 def parts_of_layer(layer: Any) -> list[Any]:
