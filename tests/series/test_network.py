@@ -38,7 +38,15 @@ def test_the_covariance_of_a_chain_adds_up() -> None:
     each = SIGMA**2 + LEAST**2
     for date in range(4):
         np.testing.assert_allclose(found.covariances[date], date * each * np.eye(6), atol=1e-12)
-    assert list(found.confirmed) == [True, False, False, False]
+    assert list(found.confirmed) == [False] * 4
+
+
+def test_what_hangs_on_a_loop_by_one_link_is_not_confirmed() -> None:
+    """The hub is no exception: what is confirmed, a loop leads to."""
+    true = truth(5)
+    links = [link(a, b, true, SIGMA) for a, b in ((0, 1), (1, 2), (0, 2), (2, 3), (3, 4))]
+    confirmed = [adjust(FRAME, links, 5, hub, is_free=True).confirmed for hub in (0, 4)]
+    assert [list(one) for one in confirmed] == [[True] * 3 + [False] * 2, [False] * 5]
 
 
 def test_two_ways_of_one_length_halve_the_variance() -> None:

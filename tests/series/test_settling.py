@@ -102,3 +102,13 @@ def test_a_pair_without_any_loop_is_believed() -> None:
     found = settled(results(2, [(0, 1)]), 2)
     assert rules(found) == {}
     assert found.verdicts[1].reason == "1 registration, in no loop"
+
+
+@pytest.mark.parametrize(("count", "is_confirmed"), [(2, False), (3, True)])
+def test_the_date_in_the_middle_is_confirmed_by_loops_alone(count: int, is_confirmed: bool) -> None:
+    """Without a reference, it is a date like any other: two dates have no loop."""
+    found = settle(FRAME, results(count, star_and_chain(count)), count, 0, is_free=True)
+    ending = "confirmed by loops" if is_confirmed else "in no loop"
+    for one in found.verdicts:
+        assert one.accepted and one.evidence.is_confirmed == is_confirmed
+        assert one.reason.endswith(ending)

@@ -85,7 +85,8 @@ class Adjustment:
     scatter_px
         What links scatter by beside their own covariance.
     confirmed
-        Which dates a second way confirms: no single link connects them with the hub, shape (n,).
+        Which dates a second way confirms, shape (n,): they lie in loops, and no single link
+        connects them with the hub.
     """
 
     displacements: FloatArray
@@ -260,7 +261,7 @@ class _Network:
         return np.array(found)
 
     def confirmed(self) -> Mask:
-        """Return which dates no single link alone connects with the hub, shape (n,)."""
+        """Return which dates lie in loops, and no single link alone connects with the hub, (n,)."""
         edges = [(link.first, link.second) for link in self.links]
         inner = []
         for k, (first, second) in enumerate(edges):
@@ -268,7 +269,8 @@ class _Network:
             if part[first] == part[second]:
                 inner.append((first, second))
         part = _parts(inner, self.count)
-        return np.asarray(part == part[self.hub])
+        in_loop = np.isin(np.arange(self.count), inner)
+        return np.asarray(in_loop & (part == part[self.hub]))
 
     def _covariance(self, link: Link, scatter_px: float) -> FloatArray:
         return np.asarray(link.covariance + scatter_px**2 * np.eye(PARAMETERS))
