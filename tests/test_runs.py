@@ -22,7 +22,7 @@ from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.atomic import Outputs, make_folder, write_json
 from groundtie.rasters.delivery import warp_raster
 from groundtie.rasters.reading import open_raster
-from groundtie.runs import run_of_call, run_tags, running
+from groundtie.runs import file_facts, file_state, run_of_call, run_tags, running
 from groundtie.tools.warp import warp
 
 GRID = utm_grid(60, 50)
@@ -151,3 +151,8 @@ class TestFolders:
         with pytest.raises(OutputError, match="too long"), running("a"):
             make_folder(tmp_path / "new" / ("n" * 300))
         assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("name", ["a\0b.tif", "\ud800.tif"])
+def test_a_name_that_no_file_has_is_no_file(name: str) -> None:
+    assert file_state(name) is None and file_facts(name) == (name,)

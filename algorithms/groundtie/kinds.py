@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import GroundTieError, ParameterError
-from .raster_names import raster_name
+from .raster_names import raster_name, require_possible
 from .stac_items import raster_of_item
 from .tables import plain_number
 
@@ -303,13 +303,7 @@ def _named(name: str, value: Any) -> Path | str:
     """Return a path or GDAL's own name; `ParameterError` for what is neither."""
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
         raise ParameterError(f"{name} must be a path, not {value!r}")
-    text = os.fspath(value)
-    try:
-        text.encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise ParameterError(f"{name} has a name that is not UTF-8: {text!a}") from error
-    if "\0" in text:
-        raise ParameterError(f"{name} has a name that no file has: {text!a}")
+    require_possible(name, os.fspath(value))
     return raster_name(value)
 
 

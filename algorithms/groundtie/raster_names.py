@@ -13,6 +13,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
 
+from .errors import ParameterError
+
 # GDAL's own names, such as /vsizip/a.zip/b.tif or HDF5:"a.h5"://b; C:\\… is a path.
 _GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
 
@@ -62,8 +64,38 @@ def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Pa
     return text if is_text or text.startswith("/vsi") else Path(text)
 
 
+def require_possible(what: str, name: str) -> None:
+    """Raise an error for a name that no file has, or that no table of results could state.
+
+    Parameters
+    ----------
+    what
+        What has the name, as the message begins.
+    name
+        The name.
+
+    Raises
+    ------
+    ParameterError
+        It cannot be a name.
+    """
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise ParameterError(f"{what} has a name that is not UTF-8: {name!a}") from error
+    if "\0" in name:
+        raise ParameterError(f"{what} has a name that no file has: {name!a}")
+
+
 def located(name: str, beside: Path | str) -> Path | str:
-    """Return what a name means that stands in a file, relative to where that file lies."""
+    """Return what a name means that stands in a file, relative to where that file lies.
+
+    Raises
+    ------
+    ParameterError
+        No file can have that name.
+    """
+    require_possible(f"what {beside} names", name)
     found = raster_name(name, beside.parent if isinstance(beside, Path) else None)
     if isinstance(found, str):
         return found

@@ -112,7 +112,7 @@ def file_state(path: Path | str) -> tuple[int, int] | None:
     """Return size in bytes, and time of the last change in nanoseconds; None: there is no file."""
     try:
         found = os.stat(path)
-    except OSError:
+    except (OSError, ValueError):  # also of what cannot be a name
         return None
     return found.st_size, found.st_mtime_ns
 

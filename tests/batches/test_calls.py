@@ -287,3 +287,15 @@ def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> No
     assert first.values["inputs"] == second.values["inputs"] == expected
     assert first.outputs == {"output_folder": folders[1] / "1"}
     assert second.outputs == {"output_folder": folders[1] / "again"}
+
+
+@pytest.mark.parametrize("href", ["a\\u0000b.tif", "\\ud800.tif"])
+def test_an_item_of_a_file_that_none_can_be_costs_no_other_row(
+    folders: tuple[Path, Path], href: str
+) -> None:
+    (folders[0] / "bad.json").write_text(
+        f'{{"type": "Feature", "id": "a", "assets": {{"red": {{"href": "{href}"}}}}}}'
+    )
+    rows = [{"inputs": "bad.json"}, {"inputs": "a.tif"}]
+    bad, good = make_calls(load_tool("coregister_series"), rows, *folders, 1)
+    assert bad.row == 1 and good.key and not good.problem

@@ -11,7 +11,7 @@ import pytest
 
 from groundtie.errors import ParameterError
 from groundtie.registration.user_masks import UserMask
-from groundtie.series.inputs import list_dates, time_of
+from groundtie.series.inputs import files_behind, list_dates, time_of
 from groundtie.stac_items import stated_time
 
 DAY = datetime.datetime(2020, 3, 4)
@@ -223,6 +223,41 @@ def test_an_empty_folder_and_two_dates_of_one_name(tmp_path: Path) -> None:
     touched(tmp_path / "y", "a.tif")
     with pytest.raises(ParameterError, match="two dates are called a"):
         list_dates([tmp_path / "x", tmp_path / "y"], None)
+
+
+IMPOSSIBLE = ["a\0b.tif", "a%00b.tif", "x/a\0/b.tif", "\ud800.tif"]
+
+
+@pytest.mark.parametrize("href", IMPOSSIBLE)
+def test_an_asset_that_no_file_can_be_is_one_line(tmp_path: Path, href: str) -> None:
+    path = tmp_path / "item.json"
+    path.write_text(json.dumps(item(1, red={"href": href, "type": TIFF})))
+    with pytest.raises(ParameterError, match=r"asset red of the item item-1 .* has a name that"):
+        list_dates([path], None)
+    assert list(files_behind(path)) == [path]
+
+
+@pytest.mark.parametrize("column", ["file", "mask"])
+def test_a_tables_file_that_no_file_can_be_is_one_line(tmp_path: Path, column: str) -> None:
+    path = tmp_path / "dates.csv"
+    row = {"file": "a.tif", "mask": "m.tif", column: "x/a\0/b.tif"}
+    path.write_text(f"file,mask\n{row['file']},{row['mask']}\n")
+    with pytest.raises(ParameterError, match=r"what .*dates\.csv names has a name that|NUL"):
+        list_dates([path], None)
+    assert path in files_behind(path)
+
+
+def test_a_date_whose_name_is_no_text_is_one_line(tmp_path: Path) -> None:
+    """It could stand in no table of results."""
+    path = tmp_path / "item.json"
+    named = {**item(1, red={"href": "a.tif", "type": TIFF}), "id": "a\udcff"}
+    path.write_text(json.dumps(named))
+    with pytest.raises(ParameterError, match="not UTF-8"):
+        list_dates([path], None)
+    (tmp_path / "d").mkdir()
+    (tmp_path / "d" / "a\udcff.tif").touch()
+    with pytest.raises(ParameterError, match="not UTF-8"):
+        list_dates([tmp_path / "d"], None)
 
 
 @pytest.mark.parametrize("name", ["../a", "x/a", "x\\a", "/a", ".", "..", "a\0"])

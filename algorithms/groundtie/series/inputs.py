@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import ParameterError
-from ..raster_names import file_name, identity, located
+from ..raster_names import file_name, identity, located, require_possible
 from ..registration.user_masks import UserMask
 from ..stac_items import (
     RASTER_SUFFIXES,
@@ -176,11 +176,11 @@ def _is_pattern(given: Path) -> bool:
 
 
 def _require_file_name(date: Listed) -> None:
-    """Raise an error for a name that somebody gave and no file in the output folder can have."""
-    if date.name == _own_name(date.raster):
-        return
-    if date.name in (".", "..") or any(sign in date.name for sign in "/\\\0"):
+    """Raise an error for a name that no file in the output folder can have."""
+    is_given = date.name != _own_name(date.raster)
+    if is_given and (date.name in (".", "..") or any(sign in date.name for sign in "/\\\0")):
         raise ParameterError(f"{date.raster} is called {date.name!r}, which cannot name a file")
+    require_possible("a date of the series", date.name)
 
 
 def _own_name(raster: Path | str) -> str:
