@@ -57,6 +57,15 @@ def test_a_log_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         pass
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no disk that is full")
+@pytest.mark.parametrize("append", [False, True])
+def test_a_full_disk_at_the_log_is_one_line(tmp_path: Path, append: bool) -> None:
+    path = tmp_path / "log"
+    path.symlink_to("/dev/full")
+    with pytest.raises(OutputError, match=r"no space left on .*\(writing log\)"):
+        written(path, Outcome(DONE), append=append)
+
+
 def test_files_must_be_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "c.tif"
     path.write_bytes(b"1234")

@@ -55,10 +55,13 @@ def open_log(path: Path, append: bool) -> Iterator[EventLog]:
     """
     with writing(path):
         file = path.open("a" if append else "w", encoding="utf-8")
-    with file:
+    try:
         if append and _torn(path):
             file.write("\n")
         yield EventLog(path, file)
+    finally:
+        with writing(path):  # what could not be written is tried once more
+            file.close()
 
 
 def read_finished(path: Path) -> dict[str, Outcome]:
