@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import GroundTieError, ParameterError
-from .raster_names import raster_name, require_possible
+from .raster_names import is_utf8, raster_name, require_possible
 from .stac_items import raster_of_item
 from .tables import plain_number
 
@@ -281,6 +281,8 @@ class Text(Kind):
     def check(self, name: str, value: Any) -> str:
         if not isinstance(value, str):
             raise ParameterError(f"{name} must be a text, not {value!r}")
+        if not is_utf8(value):
+            raise ParameterError(f"{name} must be a text in UTF-8, not {value!a}")
         return value
 
 

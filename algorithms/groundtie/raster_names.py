@@ -64,6 +64,15 @@ def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Pa
     return text if is_text or text.startswith("/vsi") else Path(text)
 
 
+def is_utf8(text: str) -> bool:
+    """Return whether UTF-8 can state a text: JSON and names of files may hold half a character."""
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def require_possible(what: str, name: str) -> None:
     """Raise an error for a name that no file has, or that no table of results could state.
 
@@ -79,10 +88,8 @@ def require_possible(what: str, name: str) -> None:
     ParameterError
         It cannot be a name.
     """
-    try:
-        name.encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise ParameterError(f"{what} has a name that is not UTF-8: {name!a}") from error
+    if not is_utf8(name):
+        raise ParameterError(f"{what} has a name that is not UTF-8: {name!a}")
     if "\0" in name:
         raise ParameterError(f"{what} has a name that no file has: {name!a}")
 

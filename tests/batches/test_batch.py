@@ -120,6 +120,15 @@ def test_a_number_that_is_not_finite_costs_no_other_row(
         assert [row["check_rmse_px"] for row in csv.DictReader(file)] == ["", ""]
 
 
+@pytest.mark.parametrize("column", ["name", "title", "output", "mode"])
+def test_half_a_character_costs_no_other_row(table: Path, column: str) -> None:
+    """JSON may hold it, as a lone surrogate, but no file in UTF-8."""
+    result = run(table, {column: "a\udcff", "careful": True}, {"name": "good"})
+    assert statuses(result) == [FAILED, DONE]
+    rows = json.loads(result.details.read_text(encoding="utf-8"))["rows"]
+    assert [row["status"] for row in rows] == [FAILED, DONE] and result.table.exists()
+
+
 @pytest.mark.parametrize("mode", ["refuse", "crash"])
 def test_a_file_of_an_earlier_run_is_no_output(table: Path, mode: str) -> None:
     folder = {"name": "x", "folder": "kept"}

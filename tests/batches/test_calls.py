@@ -88,6 +88,13 @@ def test_a_name_leads_not_out_of_the_output_folder(folders: tuple[Path, Path], n
     assert sorted(folders[0].parent.iterdir()) == sorted(folders)
 
 
+def test_a_name_that_is_no_text_is_a_problem_of_its_row(folders: tuple[Path, Path]) -> None:
+    """No table of results could state it."""
+    bad, good = calls_of(folders, {**ROW, "name": "a\udcff", "output": "c.tif"}, ROW)
+    assert bad.problem == r"the row's name 'a\udcff' is not UTF-8" and bad.name == r"a\udcff"
+    assert good.problem == ""
+
+
 @pytest.mark.parametrize("name", ["B/x", "v1.2..b", "..b", "S1A:10"])
 def test_a_name_may_lead_into_it(folders: tuple[Path, Path], name: str) -> None:
     (call,) = calls_of(folders, {**ROW, "name": name})

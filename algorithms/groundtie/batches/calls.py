@@ -11,7 +11,7 @@ from typing import Any
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, ParameterError
 from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
-from ..raster_names import raster_name
+from ..raster_names import is_utf8, raster_name
 from ..rasters.atomic import make_folder
 from ..runs import digest
 from .input_files import Listed, facts_read, names_in
@@ -83,6 +83,10 @@ def make_calls(
     calls, listed = [], cache(names_in)
     for number, row in enumerate(rows, 1):
         name = str(row.get(NAME, f"{number:0{width}}"))
+        if not is_utf8(name):
+            label = name.encode("utf-8", "backslashreplace").decode("utf-8")
+            calls.append(Call(number, label, problem=f"the row's name {name!a} is not UTF-8"))
+            continue
         given = {"workers": threads, **row} if "workers" in known else row
         try:
             calls.append(_call(tool, number, name, given, inputs, outputs, listed))
