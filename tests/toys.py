@@ -56,7 +56,8 @@ class ToyResult:
         return {"values": values, "verdict": {"check_rmse_px": 0.25, "reason": "good"}}
 
     def lines(self) -> list[str]:
-        return ["accepted", f"size {self.values['size']}"]
+        title = self.values.get("title")
+        return ["accepted", f"size {self.values['size']}", *([title] if title else [])]
 
 
 def _plain(value: Any) -> Any:

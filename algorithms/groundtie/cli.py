@@ -44,6 +44,7 @@ def main(args: Sequence[str] | None = None) -> int:
     int
         The exit code.
     """
+    _open_streams()
     _silence_libraries()
     use_one_thread()
     set_heaps()
@@ -71,6 +72,16 @@ def _usage(error: click.ClickException) -> str:
     if isinstance(error, click.UsageError) and error.ctx is not None:
         message = f"{message.rstrip('.')} (see {error.ctx.command_path} --help)"
     return message
+
+
+def _open_streams() -> None:
+    """Let a closed stream swallow what is written to it.
+
+    Whatever is opened next would get its number, and so what libraries write there.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
 def _silence_libraries() -> None:
