@@ -150,6 +150,32 @@ def test_a_full_disk_behind_standard_output_is_one_line(words: str, unbuffered: 
     assert done.returncode == 2
 
 
+@pytest.mark.parametrize("closed", ["1", "2"])
+@pytest.mark.parametrize("option", ["", "-v", "--quiet"])
+def test_a_closed_stream_costs_no_result(closed: str, option: str) -> None:
+    before, after = (option, "") if option == "-v" else ("", option)
+    words = [sys.executable, toys.__file__, *f"{before} {GOOD} {after}".split()]
+    command = ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *words]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert (done.returncode, Path("c.tif").read_bytes()) == (0, b"done")
+    assert done.stdout == ("" if closed == "1" else "accepted\nsize 3.0\n")
+
+
+def test_an_error_where_standard_error_is_closed_has_its_exit_code() -> None:
+    words = [sys.executable, toys.__file__, *GOOD.split(), "--mode", "refuse"]
+    command = ["sh", "-c", 'exec "$@" 2>&-', "sh", *words]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (3, b"")
+
+
+def test_signs_that_the_terminal_does_not_have_cost_no_result() -> None:
+    words = [sys.executable, toys.__file__, *GOOD.split(), "--title", "1–2 µm"]
+    environment = {**ENVIRONMENT, "PYTHONIOENCODING": "latin-1"}
+    run = subprocess.run(words, env=environment, capture_output=True, check=False)
+    assert (run.returncode, run.stderr) == (0, b"")
+    assert run.stdout == b"accepted\nsize 3.0\n1\\u20132 \xb5m\n"
+
+
 def test_help_lists_the_tools(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("--help") == 0
     out = capsys.readouterr().out

@@ -75,13 +75,17 @@ def _usage(error: click.ClickException) -> str:
 
 
 def _open_streams() -> None:
-    """Let a closed stream swallow what is written to it.
+    """Have streams that take every text, so that none costs the result that it is about.
 
-    Whatever is opened next would get its number, and so what libraries write there.
+    A closed one swallows it: whatever is opened next would get its number, and so what libraries
+    write there. Signs that an encoding does not have are written by their numbers.
     """
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
+        stream = getattr(sys, name)
+        if stream is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _silence_libraries() -> None:
