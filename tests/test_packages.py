@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from own_processes import ENVIRONMENT
 
 from groundtie.packages import PACKAGES, missing, needed_by_all, needed_for, use_one_thread
 from groundtie.tools import NAMES
@@ -57,3 +59,17 @@ def test_libraries_work_in_the_calling_thread_unless_stated(
     use_one_thread()
     assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
     assert os.environ["MKL_NUM_THREADS"] == "3"
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processors are allotted in Linux")
+def test_no_more_threads_than_processors_that_are_allotted() -> None:
+    """As by `taskset`, Slurm or a container: the machine may have more."""
+    script = (
+        "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+        "from groundtie.context import threads\n"
+        "from groundtie.packages import processors\n"
+        "with threads() as context: print(context.workers, processors())\n"
+    )
+    command = [sys.executable, "-c", script]
+    run = subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, text=True)
+    assert run.stdout.split() == ["1", "1"]

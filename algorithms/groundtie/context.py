@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from .memo import Memo
+from .packages import processors
 from .progress import SILENT, Progress
 
 # The most threads that may be asked for.
@@ -79,6 +79,6 @@ def threads(
     workers: int | None = None, progress: Progress = SILENT, seed: int = 0
 ) -> Iterator[Context]:
     """Open a context with threads of its own; by default one per processor."""
-    count = workers or os.cpu_count() or 1
+    count = workers or processors()
     with ThreadPoolExecutor(count) as executor:
         yield Context(executor, progress, seed, count)

@@ -126,3 +126,10 @@ def use_one_thread() -> None:
     """
     for name in _THREADS_OF:
         os.environ.setdefault(name, "1")
+
+
+def processors() -> int:
+    """Return how many processors this process may use; the machine may have more."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -14,6 +14,7 @@ from pathlib import Path
 from ..declaration import Tool
 from ..errors import CancelledError
 from ..executors import open_executor
+from ..packages import processors
 from ..progress import Progress
 from ..rasters.atomic import make_folder
 from ..tables import read_rows
@@ -85,9 +86,9 @@ class Batch:
         tool = self.load(self.tool)
         make_folder(self.folder)
         local = executor is None and self.scheduler is None
-        processors = os.cpu_count() or 1
-        workers = min(self.workers or processors, len(rows))
-        threads = max(1, processors // workers) if local else 1
+        available = processors()
+        workers = min(self.workers or available, len(rows))
+        threads = max(1, available // workers) if local else 1
         base, folder = Path(os.path.abspath(self.table)).parent, Path(os.path.abspath(self.folder))
         calls = make_calls(tool, rows, base, folder, threads)
         log_path = Path(os.path.abspath(self.log))
