@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import IO
 
 import pytest
 
 import groundtie
 from groundtie.errors import OutputError
-from groundtie.rasters import atomic
+from groundtie.rasters import atomic, hidden_files
 from groundtie.rasters.atomic import Outputs, scratch_folder
 
 # Stages two files, tells so, and waits; the second argument is the folder.
@@ -138,4 +141,24 @@ def test_scratch_folders_disappear(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert os.listdir(tmp_path) == []
     with pytest.raises(ZeroDivisionError), scratch_folder():
         _ = 1 / 0
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o444])
+def test_leftovers_are_removed_from_a_network_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int
+) -> None:
+    """NFS locks exclusively only what is open for writing."""
+    kill(start(tmp_path))
+    (lock,) = tmp_path.glob("*.lock")
+    lock.chmod(mode)
+    flock = fcntl.flock
+
+    def nfs_flock(file: IO[bytes], operation: int) -> None:
+        if fcntl.fcntl(file, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY and mode & 0o200:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        flock(file, operation)
+
+    monkeypatch.setattr(hidden_files.fcntl, "flock", nfs_flock)
+    hidden_files.remove_leftovers(tmp_path)
     assert os.listdir(tmp_path) == []

@@ -108,11 +108,19 @@ def _remove_if_dead(folder: Path, lock: str, token: str) -> None:
             (folder / lock).unlink()  # fails while its run has it open
             _remove_all(folder, token)
             return
-        with open(folder / lock, "rb") as file:
+        with _opened(folder / lock) as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while its run lives
             _remove_all(folder, token)
             # Last: who dies before leaves it to the next one.
             (folder / lock).unlink()
+
+
+def _opened(path: Path) -> IO[bytes]:
+    """Open a lock of another run; NFS locks exclusively only what is open for writing."""
+    try:
+        return path.open("r+b")
+    except PermissionError:  # of somebody else: other disks lock it, too
+        return path.open("rb")
 
 
 def _remove_all(folder: Path, token: str) -> None:
