@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from own_processes import ENVIRONMENT
 
 from groundtie import executors
 from groundtie.errors import ParameterError, SchedulerError, WorkerLostError
@@ -104,6 +105,73 @@ def test_threads_alone_run_inside_qgis(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "qgis.core", sys)
     with open_executor(2) as pool:
         assert pool.submit(process_number).result() == os.getpid()
+
+
+WHERE = """
+import multiprocessing, os
+from groundtie.executors import open_executor
+
+def is_here(number=0):
+    with open_executor(1) as pool:
+        return pool.submit(os.getpid).result() == os.getpid()
+"""
+GUARDED = """
+if __name__ == "__main__":
+    print(is_here())
+"""
+IN_A_POOL = """
+if __name__ == "__main__":
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        print(*pool.map(is_here, [0]))
+"""
+
+
+def run_python(words: list[str], script: str = "") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, *words]
+    return subprocess.run(
+        command, input=script, env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("script", "is_here"), [(WHERE + GUARDED, "False"), (WHERE + IN_A_POOL, "True")]
+)
+def test_threads_run_where_no_process_may_have_any(
+    tmp_path: Path, script: str, is_here: str
+) -> None:
+    """A worker of Python's own pools is a daemon."""
+    path = tmp_path / "script.py"
+    path.write_text(script)
+    done = run_python([str(path)])
+    assert (done.stdout, done.stderr) == (f"{is_here}\n", "")
+
+
+def test_threads_run_where_no_process_could_read_the_program() -> None:
+    done = run_python(["-"], WHERE + GUARDED)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_a_session_without_a_program_starts_processes() -> None:
+    """As in a notebook: there is nothing to read."""
+    assert run_python(["-c", WHERE + GUARDED]).stdout == "False\n"
+
+
+def test_a_program_without_a_guard_is_told(tmp_path: Path) -> None:
+    """Each process would start the program from its beginning."""
+    path = tmp_path / "script.py"
+    path.write_text(
+        "import os\n"
+        "from groundtie.executors import open_executor\n"
+        "with open_executor(1) as pool:\n"
+        "    for _ in range(3):\n"
+        "        print(pool.submit(os.getpid).exception(), flush=True)\n"
+    )
+    done = run_python([str(path)])
+    lines = done.stdout.splitlines()
+    assert len(lines) == 3
+    assert all('if __name__ == "__main__":' in line for line in lines)
+    # Not for each task.
+    assert done.stderr.count("ParameterError: ") == executors._ATTEMPTS
 
 
 class TestScheduler:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import spawn
 from typing import Any, ParamSpec, TypeVar
 
 from .errors import ParameterError, SchedulerError, WorkerLostError
@@ -32,6 +33,9 @@ POLL_SECONDS = 0.2
 
 # A worker that is killed may be a coincidence, twice with the same task is not.
 _ATTEMPTS = 2
+
+# Of programs that start processes, which read them from their beginning.
+_GUARD = 'a program that starts some must do so below if __name__ == "__main__":'
 
 _here = threading.local()
 
@@ -67,6 +71,7 @@ class Processes(Executor):
     def __init__(self, workers: int) -> None:
         self._context = multiprocessing.get_context("spawn")
         self._stop = self._context.Event()
+        self._begun, self._have_none_begun = self._context.Event(), threading.Event()
         self._threads = ThreadPoolExecutor(workers)
         self._own = threading.local()
         self._pools: list[ProcessPoolExecutor] = []
@@ -79,11 +84,15 @@ class Processes(Executor):
         return self._threads.submit(self._run, fn, *args, **kwargs)
 
     def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        for _ in range(_ATTEMPTS):
+        # Once none has begun, none will: that is told of each task, and not tried with each.
+        for _ in range(0 if self._have_none_begun.is_set() else _ATTEMPTS):
             try:
                 return self._pool().submit(fn, *args, **kwargs).result()
             except BrokenProcessPool:
                 self._own.pool = None
+        if not self._begun.is_set():
+            self._have_none_begun.set()
+            raise WorkerLostError(f"no process could be started: {_GUARD}")
         raise WorkerLostError(
             f"its process was ended {_ATTEMPTS} times, by the system (out of memory?) or somebody"
         )
@@ -91,7 +100,7 @@ class Processes(Executor):
     def _pool(self) -> ProcessPoolExecutor:
         pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
         if pool is None:
-            pool = ProcessPoolExecutor(1, self._context, _start_worker, (self._stop,))
+            pool = ProcessPoolExecutor(1, self._context, _start_worker, (self._stop, self._begun))
             self._own.pool = pool
             self._pools.append(pool)
         return pool
@@ -112,13 +121,15 @@ def open_executor(workers: int, scheduler: str | None = None) -> Iterator[Execut
     Parameters
     ----------
     workers
-        How many calls run at the same time on this machine: in processes, but in threads inside
-        QGIS, whose Python is no interpreter that another process could be started from.
+        How many calls run at the same time on this machine: in processes, but in threads where
+        none can be started.
     scheduler
         Address of a Dask scheduler, as `tcp://host:8786`: its workers run the calls, all at once.
 
     Raises
     ------
+    ParameterError
+        This process is being started itself, by a program that has no guard against that.
     SchedulerError
         The scheduler does not answer, or Dask is missing.
     """
@@ -126,13 +137,37 @@ def open_executor(workers: int, scheduler: str | None = None) -> Iterator[Execut
         with _scheduler_executor(scheduler) as executor:
             yield executor
         return
-    pool = (Threads if "qgis.core" in sys.modules else Processes)(workers)
+    pool = (Processes if _can_start_processes() else Threads)(workers)
     try:
         yield pool
     except BaseException:
         pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
+
+
+def _can_start_processes() -> bool:
+    """Return whether this process can start others.
+
+    Not inside QGIS, whose Python is no interpreter that could be started, nor in a worker of
+    Python's own pools, nor where the program was read from standard input: each process reads it.
+
+    Raises
+    ------
+    ParameterError
+        This process is reading the program in order to begin: what that does is not its task.
+    """
+    if "qgis.core" in sys.modules:
+        return False
+    try:
+        told = spawn.get_preparation_data("")  # what each process is told at its start
+    except RuntimeError as error:
+        raise ParameterError(
+            f"this is one of the processes that do the work, and cannot begin it anew: {_GUARD}"
+        ) from error
+    program = told.get("init_main_from_path")
+    is_readable = program is None or os.path.exists(program)
+    return is_readable and not multiprocessing.current_process().daemon
 
 
 @contextlib.contextmanager
@@ -189,11 +224,12 @@ def _heed(stopped: Callable[[], bool]) -> None:
     _here.stopped = stopped
 
 
-def _start_worker(stop: Any) -> None:
+def _start_worker(stop: Any, begun: Any) -> None:
     """Prepare a process: one thread for libraries, and an end as soon as its parent's.
 
     A terminal's Ctrl-C reaches all processes: the parent alone decides what comes of it.
     """
+    begun.set()
     use_one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _heed(stop.is_set)

@@ -6,6 +6,8 @@ import csv
 import json
 import math
 import pickle
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -13,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from own_processes import ENVIRONMENT
 from toys import TOY, load_toy
 
 from groundtie.batches.batch import Batch
@@ -275,3 +278,25 @@ def test_durations_in_words(seconds: float, text: str) -> None:
 
 def test_the_toys_are_tools() -> None:
     assert isinstance(load_toy("toy"), Tool) and load_toy("toy") is TOY
+
+
+@pytest.mark.slow
+def test_a_program_without_a_guard_costs_no_log(table: Path) -> None:
+    """The process that reads it anew ends before it touches what the batch has written."""
+    table.write_text(json.dumps([{"reference": "a.tif", "input": "b.tif", "size": 3}]))
+    script = table.with_name("script.py")
+    script.write_text(
+        "from pathlib import Path\n"
+        "from toys import load_toy\n"
+        "from groundtie.batches.batch import Batch\n"
+        "from groundtie.progress import SILENT\n"
+        f"table = Path({str(table)!r})\n"
+        "batch = Batch(load_toy, 'toy', table, table.parent, table.with_name('log'), 1)\n"
+        "print(*[row.outcome.message for row in batch.run(False, SILENT).rows])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, script], env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.count('if __name__ == "__main__":') == 1
+    events = [json.loads(line)["event"] for line in table.with_name("log").read_text().splitlines()]
+    assert events == ["batch", "row", "end"]
