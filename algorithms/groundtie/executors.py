@@ -84,7 +84,7 @@ class Processes(Executor):
         return self._threads.submit(self._run, fn, *args, **kwargs)
 
     def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        # Once none has begun, none will: that is told of each task, and not tried with each.
+        # Once none has begun, none will: not tried with each task.
         for _ in range(0 if self._have_none_begun.is_set() else _ATTEMPTS):
             try:
                 return self._pool().submit(fn, *args, **kwargs).result()
@@ -160,12 +160,12 @@ def _can_start_processes() -> bool:
     if "qgis.core" in sys.modules:
         return False
     try:
-        told = spawn.get_preparation_data("")  # what each process is told at its start
+        start = spawn.get_preparation_data("")  # what each process begins with
     except RuntimeError as error:
         raise ParameterError(
             f"this is one of the processes that do the work, and cannot begin it anew: {_GUARD}"
         ) from error
-    program = told.get("init_main_from_path")
+    program = start.get("init_main_from_path")
     is_readable = program is None or os.path.exists(program)
     return is_readable and not multiprocessing.current_process().daemon
 

@@ -189,7 +189,7 @@ class _PlacedOutputs(Outputs):
 
 
 def _known(file: str, key: str, run: str | None, state: str | None) -> dict[str, Any]:
-    """Return what the next run is told of a raster (see `StoredDate`)."""
+    """Return what the next run reads of a raster (see `StoredDate`)."""
     return {"file": file, "key": key, "run": run, "state": state}
 
 
