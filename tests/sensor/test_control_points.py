@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import json
 import shlex
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.shutil
+import rasterio.warp
 from affine import Affine
 from rasterio.control import GroundControlPoint
 from rasterio.crs import CRS
@@ -109,6 +111,51 @@ def test_the_georeferencer_has_an_images_own_geotransform(
     bare = read_control_points(tmp_path / "a.points", orientation, nominal)
     assert bare.crs == orientation.crs
     np.testing.assert_allclose(bare.points.input_px, points.points.input_px, atol=1e-6)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857", "EPSG:32633", "EPSG:3035", "EPSG:4937"])
+@pytest.mark.parametrize("suffix", ["geojson", "csv", "points"])
+def test_residuals_do_not_depend_on_the_map_that_the_points_lie_on(
+    tmp_path: Path, located: tuple[Orientation, Grid], crs: str, suffix: str
+) -> None:
+    points = some_points(located[0])
+    xy = np.column_stack(
+        rasterio.warp.transform(UTM, CRS.from_string(crs), *points.points.reference_xy.T)
+    )
+    elsewhere = replace(
+        points, points=replace(points.points, reference_xy=xy), crs=CRS.from_string(crs)
+    )
+    for name, written in (("here", points), ("elsewhere", elsewhere)):
+        written.write(tmp_path / f"{name}.{suffix}", *located)
+    here, there = (residuals(tmp_path / f"{name}.{suffix}") for name in ("here", "elsewhere"))
+    np.testing.assert_allclose(there["px"], here["px"], atol=1e-3)
+    if suffix != "points":
+        on_utm = np.column_stack(
+            rasterio.warp.transform(CRS.from_string(crs), UTM, *there["nominal"].T)
+        )
+        np.testing.assert_allclose(on_utm, here["nominal"], atol=1e-3)
+    if suffix == "geojson":
+        np.testing.assert_allclose(there["lines"], here["lines"], atol=1e-8)
+
+
+def residuals(path: Path) -> dict[str, np.ndarray]:
+    """Return the numbers of a file of residuals by what they are."""
+    if path.suffix == ".points":
+        return {"px": np.loadtxt(path.read_text().splitlines()[2:], delimiter=",")[:, 5:7]}
+    if path.suffix == ".csv":
+        with path.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        lines = np.array([])
+    else:
+        features = json.loads(path.read_text())["features"]
+        rows = [feature["properties"] for feature in features]
+        lines = np.array([feature["geometry"]["coordinates"] for feature in features])
+    names = {"px": ("dx_px", "dy_px"), "nominal": ("nominal_x", "nominal_y")}
+    numbers = {
+        key: np.array([[float(row[name]) for name in pair] for row in rows])
+        for key, pair in names.items()
+    }
+    return numbers | {"lines": lines}
 
 
 @pytest.mark.parametrize("crs", ["EPSG:32632+5773", "EPSG:32632+5783"])

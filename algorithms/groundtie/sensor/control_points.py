@@ -97,13 +97,15 @@ class ControlPoints:
         """
         crs = horizontal(self.crs)
         if crs != self.crs:
-            replace(self, crs=crs).write(path, replace(orientation, crs=crs), grid)
+            replace(self, crs=crs).write(path, orientation, grid)
             return
         if Path(path).suffix.lower() == GDAL_SUFFIX:
             with writing(path):
                 Path(path).write_text(self._gdal_options(), encoding="utf-8")
             return
-        seen = SensorGrid(grid.transform, self.crs, grid.width, grid.height, orientation)
+        # The points may lie on another map than the image is oriented on.
+        by = replace(orientation, crs=horizontal(orientation.crs))
+        seen = SensorGrid(grid.transform, by.crs, grid.width, grid.height, by)
         transform = Transform.nominal(self.crs, seen)
         if Path(path).suffix.lower() == GEOREFERENCER:
             with writing(path):
