@@ -135,12 +135,17 @@ def rpc_files(path: Path, more: Path | None = None) -> list[Path]:
     """
     if path.suffix.lower() not in _WITH_RPCS:
         return []
-    wanted = [path.stem.lower() + ending for ending in _RPC_ENDINGS]
+    wanted = _rpc_names(path)
     names = set(_names_beside(path))
-    if more is not None and more.parent.resolve() == path.parent.resolve():
+    if more is not None and _lies_beside(more, path):
         names.add(more.name)
     found = [name for name in names if name.lower() in wanted]
     return [path.with_name(n) for n in sorted(found, key=lambda n: (wanted.index(n.lower()), n))]
+
+
+def is_rpc_file_of(path: Path, raster: Path) -> bool:
+    """Return whether a file lies beside a raster, and is called as its RPCs are."""
+    return _lies_beside(path, raster) and path.name.lower() in _rpc_names(raster)
 
 
 def is_only_raster_of_its_name(path: Path) -> bool:
@@ -148,6 +153,14 @@ def is_only_raster_of_its_name(path: Path) -> bool:
     others = (Path(name) for name in _names_beside(path) if name != path.name)
     same = (other for other in others if other.stem.lower() == path.stem.lower())
     return all(other.suffix.lower() not in _WITH_RPCS for other in same)
+
+
+def _rpc_names(raster: Path) -> list[str]:
+    return [raster.stem.lower() + ending for ending in _RPC_ENDINGS]
+
+
+def _lies_beside(path: Path, other: Path) -> bool:
+    return path.parent.resolve() == other.parent.resolve()
 
 
 def _names_beside(path: Path) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from raster_files import write_raster
 from rpc_models import camera_rpc, to_rasterio
 
@@ -97,3 +98,54 @@ def test_refined_rpcs_are_written_where_gdal_takes_them(
         with rasterio.open(path) as dataset:
             line = float(dataset.tags(ns="RPC")["LINE_OFF"].split()[0])
         assert (line == pytest.approx(refined.image_offset[1])) == is_taken
+
+
+@pytest.mark.parametrize("output", ["image_RPC.TXT", "image.RPB", "IMAGE_rpc.txt"])
+@pytest.mark.parametrize(
+    "driver", ["NITF", "VRT", "HFA", "PCIDSK", "PNG", "ENVI", "JP2OpenJPEG", "GTiff"]
+)
+def test_rpcs_are_written_beside_no_image_whose_driver_prefers_others(
+    tmp_path: Path, driver: str, output: str
+) -> None:
+    (tmp_path / "tags").mkdir()
+    original = image_beside(tmp_path / "tags")
+    suffix = SUFFIXES[driver]
+    rasterio.shutil.copy(original, tmp_path / f"image{suffix}", driver=driver)
+    path = tmp_path / f"image{suffix}"
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        require_place(source, tmp_path / "refined_RPC.TXT")
+        require_place(source, tmp_path / "tags" / output.replace("image", "scene"))
+        if driver == "GTiff":
+            require_place(source, tmp_path / output)
+        else:
+            with pytest.raises(OutputError, match=r"is no GeoTIFF: .*--rpc.*\.tif"):
+                require_place(source, tmp_path / output)
+    write_rpc(tmp_path / output, camera_rpc(SIZE).shifted((0, 1000.0)))
+    with rasterio.open(path) as dataset:
+        line = float(dataset.tags(ns="RPC")["LINE_OFF"].split()[0])
+    # JPEG 2000 takes them as long as it has no .aux.xml with others.
+    assert (line > 1000) == (driver in ("GTiff", "JP2OpenJPEG"))
+
+
+SUFFIXES = {
+    "NITF": ".ntf",
+    "VRT": ".vrt",
+    "HFA": ".img",
+    "PCIDSK": ".pix",
+    "PNG": ".png",
+    "ENVI": ".bin",
+    "JP2OpenJPEG": ".jp2",
+    "GTiff": ".tif",
+}
+
+
+def test_where_an_image_lies_may_be_written_in_two_ways(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image_beside(tmp_path, "image.RPB")
+    monkeypatch.chdir(tmp_path)
+    with (
+        open_raster("image.tif", allow_sensor_geometry=True) as source,
+        pytest.raises(OutputError, match=r"move image\.RPB elsewhere"),
+    ):
+        require_place(source, tmp_path / "image_RPC.TXT")

@@ -214,6 +214,11 @@ class RasterSource:
             return native(self, window)
         return average_window(native, self, self, window, out_shape)
 
+    def driver(self) -> str:
+        """Return the name of GDAL's driver that reads it."""
+        with self._handles.borrow() as dataset:
+            return str(dataset.driver)
+
     def files(self) -> list[str]:
         """Return the names of the files that GDAL reads for it, those a virtual one is made of."""
         with self._handles.borrow() as dataset:

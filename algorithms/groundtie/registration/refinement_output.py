@@ -13,7 +13,7 @@ from ..declaration import given_files
 from ..errors import OutputError, SameFileError
 from ..kinds import GEOTIFF
 from ..progress import Progress
-from ..raster_names import is_only_raster_of_its_name, rpc_files
+from ..raster_names import is_only_raster_of_its_name, is_rpc_file_of, rpc_files
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import write_with_geotransform
 from ..rasters.grid import FloatArray
@@ -144,10 +144,17 @@ def require_place(source: RasterSource, output: Path, *more: Path | None) -> Non
             raise SameFileError(f"{path} is read for {source.path}: give the output another name")
     is_copy = output.suffix.lower() in GEOTIFF
     raster = output if is_copy else Path(source.path)
+    is_beside = not is_copy and is_rpc_file_of(output, raster)
+    # Other drivers prefer what the raster itself or its .aux.xml states to some or all files.
+    if is_beside and source.driver() != "GTiff":
+        raise OutputError(
+            f"GDAL may not take RPCs from {output.name}, as {raster} is no GeoTIFF: give the "
+            "output another name, to be named as its RPC file (--rpc), or write a copy (.tif)"
+        )
     found = rpc_files(raster, None if is_copy else output)
     # Those that lie beside a new raster of that name alone are removed.
-    hidden = not is_only_raster_of_its_name(output) if is_copy else output in found[1:]
-    if found and hidden:
+    is_kept = is_copy and not is_only_raster_of_its_name(output)
+    if found and (is_kept or (is_beside and found[0].name != output.name)):
         raise OutputError(
             f"GDAL takes the RPCs of {raster} from {found[0].name}, and would not take those of "
             f"{output}: move {found[0].name} elsewhere, or give the output another name"
