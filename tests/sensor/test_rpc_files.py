@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from rpc_models import DIMAP, REAL, camera_rpc, rasterio_project, real_tags, to_rasterio
 
 from groundtie.errors import GeoreferencingError, OutputError
@@ -52,6 +53,23 @@ def test_tags_of_an_image_are_read(tmp_path: Path) -> None:
     path = write_image(tmp_path / "image.tif", CAMERA)
     with open_raster(path, allow_sensor_geometry=True) as source:
         assert_same(rpc_of(source), CAMERA)
+
+
+@pytest.mark.parametrize(("driver", "suffix"), [("JP2OpenJPEG", "jp2"), ("NITF", "ntf")])
+def test_rpcs_inside_of_other_formats_are_read(tmp_path: Path, driver: str, suffix: str) -> None:
+    path = tmp_path / f"other.{suffix}"
+    rasterio.shutil.copy(write_image(tmp_path / "image.tif", CAMERA), path, driver=driver)
+    for beside in tmp_path.glob("*.aux.xml"):
+        beside.unlink()
+    with rasterio.open(path) as dataset:
+        expected = dataset.rpcs
+    with open_raster(path, allow_sensor_geometry=True) as source:
+        found = rpc_of(source)
+    ground = np.array([[9.0, 45.15], [9.0002, 45.1501]])
+    assert (
+        np.abs(found.project(ground, 300.0) - rasterio_project(expected, ground, 300.0)).max()
+        < 1e-6
+    )
 
 
 def test_a_file_replaces_the_tags(tmp_path: Path) -> None:

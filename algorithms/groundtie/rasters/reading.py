@@ -280,8 +280,10 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
             has_masks_by_band=by_band,
             interleave=interleaving.value.lower() if interleaving else None,
             colormap=colormap(dataset),
+            # Drivers do not list all that they have: JPEG 2000 no RPCs.
             tags={
-                ns: tags_of(dataset, ns=ns or None) for ns in ("", *stated(dataset.tag_namespaces))
+                ns: tags_of(dataset, ns=ns or None)
+                for ns in dict.fromkeys(("", *stated(dataset.tag_namespaces), "RPC"))
             },
             _handles=handles,
             _overviews=RemoteOverviews(len(dataset.overviews(1)))
