@@ -11,7 +11,7 @@ from affine import Affine
 from raster_files import write_raster
 from rasterio.crs import CRS
 from rasterio.transform import RPCTransformer
-from rpc_models import REAL, camera_rpc, real_tags, to_rasterio, write_dem, write_positions
+from rpc_models import REAL, camera, camera_rpc, real_tags, to_rasterio, write_dem, write_positions
 
 from groundtie.errors import NoOverlapError
 from groundtie.rasters.grid import LON_LAT, Grid, compose, reproject
@@ -127,6 +127,33 @@ def test_far_places_are_not_in_the_image(tmp_path: Path) -> None:
     # What lies in the image is found by both.
     inside = np.all((single > 0) & (single < [[[600]], [[500]]]), axis=0)
     assert both[inside].all()
+
+
+@pytest.mark.parametrize("height_m", [20.0, 780.0, 880.0, 985.0, -185.0])
+def test_ground_is_whole_at_all_heights_that_the_rpcs_are_used_for(
+    tmp_path: Path, height_m: float
+) -> None:
+    """The RPCs were made for 0 to 800 m; they hold to 1.5 times as far from the middle."""
+    px = np.stack(np.meshgrid(np.linspace(0, 599, 20), np.linspace(0, 499, 20)), -1).reshape(-1, 2)
+    # A part of a wide image that is seen from the side.
+    wide, corner = {"size": (2400, 2000), "off_nadir": (1.2, -0.5)}, np.array([900, 750])
+    rpc = camera_rpc(**wide).shifted(-corner)
+    of_dem = {"size": 240, "steepness": 0.02, "offset_m": height_m - 300}
+    image = write_positions(tmp_path / "image.tif", RPC)
+    dem_path = write_dem(tmp_path / "dem.tif", **of_dem)
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(dem_path) as dem,
+    ):
+        orientation = orient(source, rpc, UTM, dem)
+        assert orientation.known_share == 1
+        xy = orientation.to_map(px)
+        assert np.abs(orientation.to_px(xy) - px).max() < 1e-3
+        heights = orientation.heights_at(xy)
+        np.testing.assert_allclose(heights, height_m, atol=5)
+        lon_lat = reproject(xy, UTM, LON_LAT)
+        # The RPCs are that right beyond the heights that they were made for.
+        assert np.abs(camera(lon_lat, heights, **wide) - corner - px).max() < 0.01
 
 
 def test_lines_of_sight_that_miss_the_terrain_are_nan(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.geoids import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
-from ..sensor.rpc import RPC, VALID_RANGE
+from ..sensor.rpc import RPC
 from ..sensor.rpc_files import rpc_of
 
 # Filled voids of less of an image are not stated: rims are known to reduced pixels.
@@ -69,11 +69,11 @@ class Ground:
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
     def _require_range(self, rpc: RPC) -> None:
-        offset, reach = rpc.offset[2], VALID_RANGE * abs(rpc.scale[2])
-        if self.height_m is not None and abs(self.height_m - offset) > reach:
+        low, high = rpc.valid_heights_m
+        if self.height_m is not None and not low <= self.height_m <= high:
             raise ParameterError(
-                f"the RPCs do not hold at a height of {self.height_m:g} m, only from "
-                f"{offset - reach:.0f} to {offset + reach:.0f} m above the ellipsoid"
+                f"the RPCs do not hold at a height of {self.height_m:g} m, only from {low:.0f} to "
+                f"{high:.0f} m above the ellipsoid"
             )
 
     def orient(

@@ -189,7 +189,7 @@ def orient(
         See `terrain_heights`.
     """
     size = source.grid.size
-    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.height_range_m])
+    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.valid_heights_m])
     heights: Heights
     if dem is None:
         heights = ConstantHeight(rpc.offset[2] if height_m is None else height_m)

@@ -167,6 +167,12 @@ class RPC:
         reach = abs(self.scale[2])
         return self.offset[2] - reach, self.offset[2] + reach
 
+    @property
+    def valid_heights_m(self) -> tuple[float, float]:
+        """Lowest and highest height at which the coefficients may be used (see `is_valid`)."""
+        reach = VALID_RANGE * abs(self.scale[2])
+        return self.offset[2] - reach, self.offset[2] + reach
+
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
         """Return which ground positions lie where the coefficients may be used, shape (n,).
 
