@@ -17,7 +17,7 @@ from rpc_models import camera_rpc, to_rasterio
 from groundtie.errors import OutputError, SameFileError
 from groundtie.progress import SILENT
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.refinement_output import RefinementFiles, _write_rpcs, require_place
+from groundtie.registration.refinement_output import RefinementFiles, require_place, write_rpcs
 from groundtie.registration.sensor_input import open_sensor_image
 from groundtie.sensor.rpc_files import read_rpc, write_rpc
 
@@ -30,7 +30,7 @@ def test_the_refined_rpcs_are_written_in_the_format_of_the_name(tmp_path: Path, 
     fit: Any = SimpleNamespace(rpc=camera_rpc(SIZE))
     with open_raster(path) as source:
         image: Any = SimpleNamespace(source=source)
-        _write_rpcs(image, fit, tmp_path / name, SILENT)
+        write_rpcs(image, fit, tmp_path / name, SILENT)
     lon_lat = fit.rpc.localise([[0.0, 0.0], [59.0, 49.0]], 0.0)
     if name.startswith("copy"):
         with ExitStack() as stack:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,14 @@ import pytest
 import rasterio
 from raster_files import utm_grid, write_raster
 from rpc_models import camera_rpc, to_rasterio
+from rpc_scenes import SIZE, Scene, make_scene
 from textured_pairs import TexturedPair, texture
 
 import groundtie
-from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.errors import NotRegisteredError, OutputError, ParameterError
 from groundtie.registration import automatic
 from groundtie.registration.registration import Registration
+from groundtie.sensor.bias import Bias
 
 
 @pytest.mark.slow
@@ -49,6 +52,66 @@ def test_an_image_with_rpcs_has_none_to_write(
             **{name: tmp_path / f"other{suffix}"},
         )
     assert not (tmp_path / "out.tif").exists()
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    bias = Bias("shift", SIZE, np.array([[9.0, -7.0]]), np.zeros((2, 2)))
+    return make_scene(tmp_path_factory.mktemp("scene"), bias)
+
+
+@pytest.mark.slow
+def test_an_image_with_rpcs_is_registered_as_its_two_steps_are(
+    scene: Scene, tmp_path: Path
+) -> None:
+    heights: Any = {"dem": scene.dem, "dem_datum": "ellipsoidal"}
+    files: Any = {"tie_points": tmp_path / "points.csv", "report": tmp_path / "report.html"}
+    result = groundtie.register(
+        scene.reference, scene.image, tmp_path / "at_once.tif", **heights, **files
+    )
+    assert result.files == {
+        name: str(path)
+        for name, path in {"output": tmp_path / "at_once.tif", **files}.items()
+        if name != "tie_points"
+    } | {"residuals": str(files["tie_points"])}
+    # What was asked for, and nothing of how it was done.
+    given = json.loads((tmp_path / "report.json").read_text())["parameters"]
+    assert given["input"] == str(scene.image) and given["output"] == str(tmp_path / "at_once.tif")
+    assert {"image", "rpc", "residuals", "image_band"}.isdisjoint(given)
+    rpcs = tmp_path / "refined_RPC.TXT"
+    groundtie.refine_rpc(scene.image, rpcs, scene.reference, **heights)
+    groundtie.orthorectify(
+        scene.image, tmp_path / "steps.tif", rpc=rpcs, crs="EPSG:32632", **heights
+    )
+    with (
+        rasterio.open(tmp_path / "at_once.tif") as found,
+        rasterio.open(tmp_path / "steps.tif") as expected,
+    ):
+        assert found.transform == expected.transform
+        np.testing.assert_array_equal(found.read(), expected.read())
+
+
+@pytest.mark.slow
+def test_an_image_with_rpcs_leaves_all_files_or_none(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+
+    def full(_: Any, path: Path, *__: Any) -> None:
+        path.write_bytes(b"part")
+        raise OutputError("no space left")
+
+    monkeypatch.setattr(automatic, "write_orthoimage", full)
+    with pytest.raises(OutputError, match="no space left"):
+        groundtie.register(
+            scene.reference,
+            scene.image,
+            tmp_path / "registered.tif",
+            dem=scene.dem,
+            dem_datum="ellipsoidal",
+            tie_points=tmp_path / "points.csv",
+            report=tmp_path / "report.html",
+        )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_matches_at_two_places_is_not_tried_in_another_way(

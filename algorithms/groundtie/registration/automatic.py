@@ -16,17 +16,18 @@ from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import AUTO
 from ..progress import SILENT, Progress
-from ..rasters.atomic import Outputs, scratch_folder
 from ..rasters.reading import bounded_cache, open_raster
 from ..sensor.rpc_files import rpc_of
+from ..sensor.rpc_fit import RPCFit
 from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, asked_terrain
 from .delivery import Call
 from .orthorectification import write_orthoimage
 from .pipeline import run
+from .refinement_output import RefinementFiles, WriteOutput
 from .registration import Registration
 from .scene import SceneInfo
-from .sensor_input import Ground, open_oriented_image
-from .sensor_jobs import RefinedRpc, refine
+from .sensor_input import Ground, OrientedImage
+from .sensor_jobs import RefinedRpc, refine_into
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
@@ -191,30 +192,31 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
             )
     if given["output"] is None:
         raise ParameterError("an image with RPCs is orthorectified: give an output")
+    output, points, report = given["output"], given["tie_points"], given["report"]
+    ground, workers = Ground(given["dem"], given["dem_datum"]), given["workers"]
+    files = RefinementFiles(output, points, report, parameters, _orthorectifier(ground, workers))
     given |= {
         "image": given["input"],
         "image_band": given["input_band"],
         "image_mask": given["input_mask"],
-        "residuals": given["tie_points"],
+        "residuals": points,
+        # The RPCs themselves are not written.
+        "output": None,
     }
-    output = Path(given["output"])
-    with scratch_folder() as folder:
-        refined = folder / "refined_RPC.TXT"
-        result = refine({**given, "output": refined}, progress.part(0.0, 0.7))
-        _orthorectify(given, refined, output, progress.part(0.7, 1.0))
-    return OrthorectifiedRpc(**vars(result) | {"files": {**result.files, "output": str(output)}})
+    return OrthorectifiedRpc(**vars(refine_into(files, given, progress)))
 
 
-def _orthorectify(
-    given: Mapping[str, Any], rpc_file: Path, output: Path, progress: Progress
-) -> None:
-    ground = Ground(given["dem"], given["dem_datum"])
-    with threads(given["workers"], progress) as context, ExitStack() as stack:
-        stack.enter_context(bounded_cache())
-        crs = stack.enter_context(open_raster(given["reference"])).grid.crs
-        image = open_oriented_image(given["input"], rpc_file, ground, crs, stack, SILENT)
-        staged = stack.enter_context(Outputs()).stage(output)
-        write_orthoimage(image, staged, context)
+def _orthorectifier(ground: Ground, workers: int | None) -> WriteOutput:
+    """Return the function that writes the orthoimage by refined RPCs."""
+
+    def write(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
+        with threads(workers, progress) as context, ExitStack() as stack:
+            # Anew: by RPCs that were wrong, the heights of another region were read.
+            crs = image.orientation.crs
+            refined = ground.orient(image.source, fit.rpc, crs, stack, SILENT)
+            write_orthoimage(refined, path, context)
+
+    return write
 
 
 # What `refine` takes and the tool `register` does not ask for.

@@ -1,9 +1,9 @@
-"""The files of a refinement: RPCs or a copy of the image with them, residuals, report."""
+"""The files of a refinement: RPCs or an image that is made with them, residuals, report."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,25 @@ from .ground_control import GroundControl
 from .refinement import Refinement
 from .sensor_input import OrientedImage
 
+# Writes what refined RPCs make of an image.
+WriteOutput = Callable[[OrientedImage, RPCFit, Path, Progress], None]
+
+
+def write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
+    """Write refined RPCs by themselves, or a copy of the image with them, by the suffix of `path`.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    source = image.source
+    if path.suffix.lower() in GEOTIFF:
+        tags = rpc_to_tags(fit.rpc)
+        write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
+        return
+    write_rpc(path, fit.rpc)
+
 
 @dataclass(frozen=True)
 class RefinementFiles:
@@ -38,6 +57,8 @@ class RefinementFiles:
     ----------
     parameters
         What the tool was called with, for the report.
+    write_output
+        Writes the output.
     started
         When, by `time.perf_counter`.
     """
@@ -46,6 +67,7 @@ class RefinementFiles:
     residuals: Path | None
     report: Path | None
     parameters: Mapping[str, Any]
+    write_output: WriteOutput = write_rpcs
     started: float = field(default_factory=time.perf_counter)
 
     def written(self) -> dict[str, str]:
@@ -84,7 +106,7 @@ class RefinementFiles:
         found
             The matching that the points come from; None: they were given.
         progress
-            Receives every tile of a copied image.
+            Receives every tile of an image that is written.
 
         Raises
         ------
@@ -95,7 +117,7 @@ class RefinementFiles:
         with Outputs() as outputs:
             if accepted:
                 fit = refinement.accepted()
-                _write_rpcs(image, fit, outputs.stage(self.output), progress)
+                self.write_output(image, fit, outputs.stage(self.output), progress)
                 if self.residuals is not None:
                     by_refined = replace(image.orientation, rpc=fit.rpc)
                     staged = outputs.stage(self.residuals)
@@ -119,7 +141,7 @@ class RefinementFiles:
         )
 
 
-def require_place(source: RasterSource, output: Path, *more: Path | None) -> None:
+def require_place(source: RasterSource, output: Path | None, *more: Path | None) -> None:
     """Refuse outputs that are files of the image, and RPCs that GDAL would not take from there.
 
     Parameters
@@ -127,7 +149,7 @@ def require_place(source: RasterSource, output: Path, *more: Path | None) -> Non
     source
         The image.
     output
-        Where its RPCs, or a copy with them, are to be written.
+        Where its RPCs, or a copy with them, are to be written; None: nowhere.
     more
         Further outputs; None: not asked for.
 
@@ -142,6 +164,8 @@ def require_place(source: RasterSource, output: Path, *more: Path | None) -> Non
     for path in (output, *more):
         if path is not None and path.resolve() in read:
             raise SameFileError(f"{path} is read for {source.path}: give the output another name")
+    if output is None:
+        return
     is_copy = output.suffix.lower() in GEOTIFF
     raster = output if is_copy else Path(source.path)
     is_beside = not is_copy and is_rpc_file_of(output, raster)
@@ -159,15 +183,6 @@ def require_place(source: RasterSource, output: Path, *more: Path | None) -> Non
             f"GDAL takes the RPCs of {raster} from {found[0].name}, and would not take those of "
             f"{output}: move {found[0].name} elsewhere, or give the output another name"
         )
-
-
-def _write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
-    source = image.source
-    if path.suffix.lower() in GEOTIFF:
-        tags = rpc_to_tags(fit.rpc)
-        write_with_geotransform(source, source.grid, path, rpc_tags=tags, progress=progress)
-        return
-    write_rpc(path, fit.rpc)
 
 
 def _compared(refinement: Refinement, found: GroundControl) -> Comparison:

@@ -179,12 +179,19 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     NotRegisteredError
         The ground control or the refined RPCs are refused; the report is written.
     """
-    gcps, dem = parameters["gcps"], parameters["dem"]
-    if (parameters["reference"] is None) == (gcps is None):
-        raise ParameterError("give either a reference or ground control points (gcps)")
     files = RefinementFiles(
         parameters["output"], parameters["residuals"], parameters["report"], parameters
     )
+    return refine_into(files, parameters, progress)
+
+
+def refine_into(
+    files: RefinementFiles, parameters: Mapping[str, Any], progress: Progress
+) -> RefinedRpc:
+    """Refine RPCs as `refine`, and write files that need not be those of the parameters."""
+    gcps, dem = parameters["gcps"], parameters["dem"]
+    if (parameters["reference"] is None) == (gcps is None):
+        raise ParameterError("give either a reference or ground control points (gcps)")
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
         stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
