@@ -17,7 +17,7 @@ from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
 
 import groundtie
 from groundtie.errors import GroundTieError, NoOverlapError, OutputError, ParameterError
-from groundtie.rasters.grid import Grid, apply_affine
+from groundtie.rasters.grid import LON_LAT, Grid, apply_affine, reproject
 from groundtie.sensor.rpc_files import write_rpc
 
 RPC = camera_rpc()
@@ -90,6 +90,23 @@ def test_where_no_height_is_known_there_is_no_data(files: dict[str, Path], tmp_p
     # Without a grid of its own it gets one of the whole image.
     own = groundtie.orthorectify(**part, dem_datum="ellipsoidal")
     assert abs(own.grid.width - whole.grid.width) < 60
+
+
+@pytest.mark.parametrize("rise_m", [30.0, -30.0])
+@pytest.mark.parametrize("east_m", [-6.0, 0.0, 0.6])
+def test_a_wall_amid_the_image_does_not_tell_the_pixel_size(
+    files: dict[str, Path], tmp_path: Path, east_m: float, rise_m: float
+) -> None:
+    """The camera's pixels are of 1 m on level ground, here of the wall's foot or of its top."""
+    centre = reproject(RPC.localise([[299.5, 249.5]], 200.0), LON_LAT, UTM)[0]
+    grid = Grid(Affine(0.5, 0, centre[0] - 600, 0, -0.5, centre[1] + 600), UTM, 2400, 2400)
+    east = grid.pixel_to_map(np.column_stack([np.arange(2400), np.zeros(2400)]))[:, 0] - centre[0]
+    heights = np.where(east > east_m, 200.0 + rise_m, 200.0).astype(np.float32)
+    dsm = write_raster(tmp_path / "dsm.tif", np.tile(heights, (2400, 1)), grid)
+    result = groundtie.orthorectify(
+        files["image"], files["output"], dsm, dem_datum="ellipsoidal", resampling="nearest"
+    )
+    assert result.grid.pixel_size_m == pytest.approx(1.0, rel=0.005)
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,7 @@ def registered_grid(
     px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None = None,
+    smooth: PointFunction | None = None,
 ) -> Grid:
     """Return a grid for a registered raster that covers all of it.
 
@@ -83,6 +84,8 @@ def registered_grid(
         CRS of the result.
     pixel_size_m
         Pixel size in metres (in pixels without georeferencing).
+    smooth
+        Near to `px_to_map`, and tells how large pixels are; None: that does itself.
 
     Raises
     ------
@@ -92,7 +95,8 @@ def registered_grid(
         The transform stretches the raster out of all proportion, or the pixels are too many or
         larger than all of it.
     """
-    usual = _registered_grid(input_grid, px_to_map, crs, None)
+    smooth = smooth or px_to_map
+    usual = _registered_grid(input_grid, px_to_map, crs, None, smooth)
     stretch = np.hypot(*usual.size) / np.hypot(*input_grid.size)
     if stretch > _LARGEST_STRETCH:
         raise GridSizeError(
@@ -103,7 +107,7 @@ def registered_grid(
         return usual
     if pixel_size_m > np.max(np.multiply(usual.pixel_sides_m, usual.size)):
         raise GridSizeError(f"a pixel size of {pixel_size_m:.6g} is larger than the whole raster")
-    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m)
+    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m, smooth)
 
 
 def _registered_grid(
@@ -111,6 +115,7 @@ def _registered_grid(
     px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None,
+    smooth: PointFunction,
 ) -> Grid:
     footprint = px_to_map(input_grid.outline())
     if pixel_size_m is None and crs == input_grid.crs:
@@ -118,7 +123,7 @@ def _registered_grid(
     if not input_grid.is_georeferenced and crs is None:
         return covering_grid(input_grid.scaled(pixel_size_m or 1.0), footprint)
     col, row = input_grid.centre_px
-    corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
+    corners = smooth(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")

@@ -34,7 +34,7 @@ def write_orthoimage(
     grid
         The grid of the result; None: one that covers the image, in the orientation's CRS.
     pixel_size
-        Of that grid, in its unit; None: that of the image on the ground.
+        Of that grid, in metres; None: that of the image on level ground.
     resampling
         One of `warping.METHODS`.
 
@@ -47,7 +47,9 @@ def write_orthoimage(
     if grid is None:
         # Where another georeferencing than the RPCs places the image does not count.
         pixels = source.grid.on_own_pixels()
-        grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size)
+        # A wall or a steep slope must not tell how large pixels are.
+        smooth = by.to_level_map
+        grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size, smooth)
     else:
         middle = grid.pixel_to_map([grid.centre_px])[0, 0]
         outline = near_longitude(by.to_nominal_map(source.grid.outline()), middle, by.crs)

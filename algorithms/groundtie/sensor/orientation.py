@@ -100,9 +100,13 @@ class Orientation:
         xy = self.to_map(px)
         lost = ~np.isfinite(xy).all(axis=1)
         if lost.any():
-            level = self.rpc.localise(px[lost], self.heights.typical_m)
-            xy[lost] = _on_map(level, self.rpc, self.crs)
+            xy[lost] = self.to_level_map(px[lost])
         return np.where(np.isfinite(xy), xy, np.nan)
+
+    def to_level_map(self, px: ArrayLike) -> FloatArray:
+        """Return the map positions, shape (n, 2), that image positions see at a typical height."""
+        level = self.rpc.localise(px, self.heights.typical_m)
+        return _on_map(level, self.rpc, self.crs)
 
     def _ground(self, px: FloatArray) -> FloatArray:
         """Return longitude and latitude, (n, 2), that image positions see; NaN: none.
