@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 from dataclasses import fields, replace
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -143,6 +144,15 @@ def test_rpc00a_has_the_same_polynomials_in_another_order(tmp_path: Path) -> Non
     image = write_image(tmp_path / "b.tif")
     with open_raster(image, allow_sensor_geometry=True) as source:
         assert_same(rpc_of(source), CAMERA)
+    # So it does in an archive.
+    with ZipFile(tmp_path / "product.zip", "w") as product:
+        for name in ("a.tif", "a.rpb", "b.tif", "b.rpb"):
+            product.write(tmp_path / name, f"inner/{name}")
+    for archive in (f"{tmp_path}/product.zip", f"{{{tmp_path}/product.zip}}"):
+        for name in ("a.tif", "b.tif"):
+            path = f"/vsizip/{archive}/inner/{name}"
+            with open_raster(path, allow_sensor_geometry=True) as source:
+                assert_same(rpc_of(source), CAMERA)
 
 
 def monomials_at(lon: float, lat: float, height: float) -> np.ndarray:

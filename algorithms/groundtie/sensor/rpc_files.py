@@ -10,7 +10,9 @@ import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
+from io import TextIOWrapper
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from ..errors import GeoreferencingError, OutputError
 from ..rasters.atomic import writing
@@ -26,6 +28,9 @@ _RPC00A = (0, 1, 2, 3, 4, 5, 6, 10, 7, 8, 9, 11, 14, 17, 12, 15, 18, 13, 16, 19)
 
 # How the names of tiles of DIMAP products end: row and column. The first begins as the image.
 _TILE = re.compile(r"_R(\d+)C(\d+)$", re.IGNORECASE)
+
+# GDAL's names of what lies in ZIP archives.
+_ZIP = "/vsizip/"
 
 # Names in .RPB files, and those in GDAL's domain.
 _RPB_NAMES = {
@@ -77,7 +82,7 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
         )
     for name in source.files():
         # GDAL takes the terms of RPC00A for those of RPC00B.
-        if name.lower().endswith(".rpb") and _is_rpc00a(Path(name)):
+        if name.lower().endswith(".rpb") and _is_rpc00a(name):
             return read_rpc(name)
     return rpc_from_tags(tags, source.path)
 
@@ -92,11 +97,26 @@ def _require_whole(source: RasterSource, path: str | os.PathLike[str]) -> None:
         )
 
 
-def _is_rpc00a(path: Path) -> bool:
-    # What lies in an archive is left to GDAL.
-    if not path.is_file():
+def _is_rpc00a(name: str) -> bool:
+    try:
+        return _spec_id(_text_of(name, "replace")) == "RPC00A"
+    except OSError:
+        # What only GDAL can read, as on another machine or in another archive, is left to it.
         return False
-    return _spec_id(path.read_text(encoding="utf-8", errors="replace")) == "RPC00A"
+
+
+def _text_of(name: str, errors: str = "strict") -> str:
+    """Return the text of a file, also of one in a ZIP archive; raises `OSError`."""
+    if not name.startswith(_ZIP):
+        return Path(name).read_text("utf-8-sig", errors)
+    # GDAL may have the archive in braces.
+    path = Path(re.sub("[{}]", "", name.removeprefix(_ZIP)))
+    archive = next((folder for folder in path.parents if folder.is_file()), path)
+    try:
+        with ZipFile(archive) as files, files.open(path.relative_to(archive).as_posix()) as file:
+            return TextIOWrapper(file, "utf-8-sig", errors).read()
+    except (BadZipFile, KeyError, RuntimeError) as error:
+        raise OSError(str(error)) from error
 
 
 def read_rpc(path: str | os.PathLike[str]) -> RPC:
@@ -112,7 +132,7 @@ def read_rpc(path: str | os.PathLike[str]) -> RPC:
     if parse is None:
         raise GeoreferencingError(f"RPCs are read from {', '.join(_READERS)}: {name}")
     try:
-        tags = parse(Path(name).read_text(encoding="utf-8-sig"))
+        tags = parse(_text_of(name))
     except (OSError, UnicodeDecodeError, ElementTree.ParseError, ValueError) as error:
         raise GeoreferencingError(f"cannot read the RPCs {name}: {error}") from error
     return rpc_from_tags(tags, name)
