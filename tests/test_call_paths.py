@@ -7,7 +7,10 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import rasterio.shutil
+from raster_files import utm_grid, write_raster
 
 from groundtie.call_paths import check_different, check_paths
 from groundtie.errors import OutputError, SameFileError
@@ -53,6 +56,20 @@ def test_an_output_is_not_an_input_even_by_another_name(tmp_path: Path) -> None:
                 ("input", RASTER, tmp_path / "a.tif"),
             ]
         )
+
+
+@pytest.mark.parametrize("kind", [RASTER, MaskIn(**TEXTS), RastersIn(**TEXTS)])
+def test_an_output_is_nothing_that_a_virtual_input_is_made_of(tmp_path: Path, kind: Kind) -> None:
+    write_raster(tmp_path / "a.tif", np.zeros((4, 6)), utm_grid(6, 4))
+    rasterio.shutil.copy(tmp_path / "a.tif", tmp_path / "a.vrt", driver="VRT")
+    outer = tmp_path / "outer.vrt"
+    outer.write_text((tmp_path / "a.vrt").read_text().replace("a.tif", "a.vrt"))
+    (tmp_path / "link.tif").symlink_to(tmp_path / "a.tif")
+    given = ("given", kind, (outer,) if isinstance(kind, RastersIn) else outer)
+    for name in ("a.tif", "a.vrt", "link.tif"):
+        with pytest.raises(SameFileError, match="output is the same file as a source of given"):
+            check_paths([("output", RASTER_OUT, tmp_path / name), given])
+    check_paths([("output", RASTER_OUT, tmp_path / "b.tif"), given])
 
 
 @pytest.mark.parametrize("name", ["b_RPC.TXT", "b.rpb"])

@@ -21,6 +21,7 @@ from .kinds import (
 )
 from .raster_names import identity, rpc_files
 from .strict_json import read_json
+from .vrt_sources import sources_of
 
 
 def check_different(rasters: Mapping[str, Any]) -> None:
@@ -43,7 +44,8 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     Raises
     ------
     SameFileError
-        An output, or a file that is written because of it, is an input or another one.
+        An output, or a file that is written because of it, is an input, what a virtual raster
+        among these is made of, or another one.
     OutputError
         An output's folder is missing or cannot be written to, a folder is a file, or a file is in
         the place of the numbers of a report.
@@ -51,7 +53,10 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     taken: dict[Hashable, str] = {}
     outputs: list[tuple[str, WrittenKind, Path]] = []
     for name, kind, value in values:
-        taken |= dict.fromkeys(map(_identity, inputs_of(kind, value)), name)
+        for read in map(_identity, inputs_of(kind, value)):
+            taken[read] = name
+            for source in sources_of(read) if isinstance(read, Path) else ():
+                taken.setdefault(source, f"a source of {name}")
         if isinstance(kind, WrittenKind) and value is not None:
             outputs.append((name, kind, value))
     made = {path.resolve() for _, kind, path in outputs if isinstance(kind, FolderOut)}

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rasterio
-import rasterio.shutil
 from loopback_server import serving
 from raster_files import UTM, utm_grid, write_raster
-from rasterio.vrt import WarpedVRT
 from textured_pairs import shift_on_map
 
 import groundtie
@@ -21,7 +19,6 @@ from groundtie.errors import ParameterError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.reading import open_raster
-from groundtie.rasters.vrt import sources_of
 
 GRID = utm_grid(70, 50)
 VALUES = np.random.default_rng(2).integers(0, 200, (2, 50, 70)).astype(np.uint8)
@@ -39,26 +36,6 @@ def image(tmp_path: Path) -> Path:
 def folders(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "out").mkdir()
-
-
-def test_the_sources_of_virtual_rasters_are_found_at_any_depth(image: Path) -> None:
-    inner, outer, warped, own = (
-        image.with_name(f"{name}.vrt") for name in ("inner", "outer", "warped", "own")
-    )
-    rasterio.shutil.copy(image, inner, driver="VRT")
-    outer.write_text(inner.read_text().replace("a.tif", "inner.vrt"))
-    with rasterio.open(image) as dataset, WarpedVRT(dataset, crs="EPSG:4326") as other:
-        rasterio.shutil.copy(other, warped, driver="VRT")
-    warped.write_text(warped.read_text().replace("a.tif", "inner.vrt"))
-    for virtual in (outer, warped):
-        with rasterio.open(virtual) as dataset:
-            assert dataset.read().any()
-    assert sources_of(outer) == sources_of(warped) == [inner, image]
-    assert sources_of(image) == sources_of(image.with_name("none.vrt")) == []
-    own.write_text(inner.read_text().replace("a.tif", "../in/own.vrt"))
-    assert sources_of(own) == []
-    inner.write_text("<VRTDataset>")
-    assert sources_of(outer) == [inner]
 
 
 def stored(path: Path, model: PolynomialModel) -> Path:

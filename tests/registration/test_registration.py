@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rasterio.shutil
 from textured_pairs import TexturedPair, listing
 
 from groundtie.errors import (
@@ -135,6 +136,16 @@ class TestWhatIsWrittenOverNothing:
         other.write_bytes(textured.input.read_bytes())
         with pytest.raises(SameFileError, match="output is the same file as raster"):
             registration.warp(other, other)
+        assert other.read_bytes() == textured.input.read_bytes()
+
+    def test_nor_over_what_that_is_made_of(
+        self, registration: Registration, textured: TexturedPair, tmp_path: Path
+    ) -> None:
+        other, virtual = tmp_path / "other.tif", tmp_path / "virtual.vrt"
+        other.write_bytes(textured.input.read_bytes())
+        rasterio.shutil.copy(other, virtual, driver="VRT")
+        with pytest.raises(SameFileError, match="output is the same file as a source of raster"):
+            registration.warp(virtual, other)
         assert other.read_bytes() == textured.input.read_bytes()
 
     def test_nor_over_what_else_the_registration_was_called_with(

@@ -13,9 +13,9 @@ from ..declaration import Tool
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..rasters.atomic import SIDECARS
-from ..rasters.vrt import sources_of
 from ..runs import file_facts
 from ..series.inputs import files_behind
+from ..vrt_sources import sources_of
 
 # What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
 # is not asked: it would open each file here, where one that kills it ends more than its row.

@@ -24,9 +24,6 @@ _IN_ARCHIVE = re.compile(r"(/vsi(?:zip|tar|gzip|7z|rar)/)([^/{].*)")
 # What stands between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one.
 _PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
-# What names a source: of mosaics, bands and overviews, and of what is warped.
-_SOURCES = ("SourceFilename", "SourceDataset")
-
 # What else would locate the pixels, or is of the file that they are in.
 _OWN = ("GCPList", "GeoTransform")
 _OWN_DOMAINS = ("RPC", "GEOLOCATION", "DERIVED_SUBDATASETS")
@@ -73,36 +70,6 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
             tag = ElementTree.SubElement(ElementTree.SubElement(root, "Metadata"), "MDI", key=key)
             tag.text = value
         ElementTree.ElementTree(root).write(path, encoding="utf-8")
-
-
-def sources_of(path: Path) -> list[Path]:
-    """Return the files that a virtual raster is made of, and those that these are made of.
-
-    GDAL, which is not asked, names the first ones alone; other rasters are made of none.
-    """
-    own = Path(os.path.abspath(path))
-    found: dict[Path, None] = {own: None}
-    waiting = [own]
-    while waiting:
-        new = [one for one in _named_in(waiting.pop()) if one not in found]
-        found |= dict.fromkeys(new)
-        waiting += new
-    return list(found)[1:]
-
-
-def _named_in(path: Path) -> list[Path]:
-    if path.suffix.lower() != SUFFIX:
-        return []
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError, ValueError):
-        return []
-    elements = [one for tag in _SOURCES for one in root.iter(tag) if one.text]
-    names = [
-        path.parent / str(one.text) if one.get("relativeToVRT") == "1" else Path(str(one.text))
-        for one in elements
-    ]
-    return [Path(os.path.abspath(name)) for name in names]
 
 
 def _absolute(name: str) -> str:

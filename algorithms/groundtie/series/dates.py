@@ -25,10 +25,10 @@ from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
-from ..rasters.vrt import sources_of
 from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
 from ..runs import digest, file_facts
+from ..vrt_sources import sources_of
 from .date_masks import DateMask, draw_mask
 from .inputs import Listed
 
