@@ -9,7 +9,8 @@ import numpy as np
 import rasterio.windows
 from numpy.typing import NDArray
 
-from .metadata import fits
+from .metadata import fits, numpy_dtype
+from .nodata import is_nodata
 
 if TYPE_CHECKING:
     from .reading import RasterSource
@@ -113,8 +114,9 @@ def _validity(
             valid[i] = values[i] > 0
             continue
         nodata = source.bands[number - 1].nodata
-        if nodata is not None and fits(nodata, values.dtype):
-            valid[i] &= values[i] != values.dtype.type(nodata)
+        stored = numpy_dtype(source.bands[number - 1].dtype)
+        if nodata is not None and fits(nodata, stored):
+            valid[i] &= ~is_nodata(values[i], nodata, stored)
         if source.has_mask_band:
             valid[i] &= dataset.read_masks(number, window=place) > 0
         if source.alpha_band is not None:

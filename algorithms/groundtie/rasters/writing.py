@@ -23,6 +23,7 @@ from .atomic import scratch_file, scratch_folder, writing
 from .grid import Grid
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
+from .nodata import is_nodata, nodata_range
 from .reading import RasterSource
 from .tiff_blocks import PixelType
 from .tiff_directories import BLOCK, base_image
@@ -34,10 +35,6 @@ from .windows import Mask
 # Metadata that belong to the file, or locate the pixels, of the input only.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
 _OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
-
-# GDAL takes floating-point numbers, of double precision, too, for the nodata value if they differ
-# from it by less than this share of it: `ARE_REAL_EQUAL` of its gcore/gdal_priv.h.
-_SAME_AS_NODATA = 4 * float(np.finfo(np.float32).eps)
 
 # Endings by which users ask for a Cloud Optimized GeoTIFF.
 COG_SUFFIXES = (".cog.tif", ".cog.tiff")
@@ -281,6 +278,6 @@ def keep_apart(values: NDArray[Any], fill: Any) -> None:
         neighbour = nodata + 1 if nodata < np.iinfo(part.dtype).max else nodata - 1
         part[part == nodata] = neighbour
     elif np.isfinite(nodata):
-        near = np.abs(part - nodata) <= _SAME_AS_NODATA * abs(nodata)
-        apart = nodata * part.dtype.type(1 - 1.25 * _SAME_AS_NODATA)
-        part[near] = apart if nodata else np.nextafter(nodata, part.dtype.type(1))
+        nearest_0 = min(nodata_range(float(nodata), part.dtype), key=abs)
+        apart = np.nextafter(nearest_0, part.dtype.type(0 if nodata else 1))
+        part[is_nodata(part, float(nodata), part.dtype)] = apart
