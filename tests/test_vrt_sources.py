@@ -65,4 +65,6 @@ def test_names_are_relative_to_where_a_link_leads(tmp_path: Path, image: Path) -
     (tmp_path / "v.vrt").symlink_to(virtual)
     (tmp_path / "deep" / "er" / "link").symlink_to(tmp_path / "far")
     for name in ("v.vrt", "deep/er/link/v.vrt"):
+        with rasterio.open(tmp_path / name) as dataset:
+            np.testing.assert_array_equal(dataset.read(1), VALUES)
         assert sources_of(tmp_path / name) == [image]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from loopback_server import serving
 from raster_files import UTM, utm_grid, write_raster
+from rasterio.vrt import WarpedVRT
 from textured_pairs import shift_on_map
 
 import groundtie
@@ -64,6 +67,137 @@ def test_pixels_and_mask_are_the_files_own_in_another_place(tmp_path: Path, imag
             np.testing.assert_array_equal(moved.read(), VALUES)
     finally:
         tmp_path.with_name(f"{tmp_path.name}-moved").rename(tmp_path)
+
+
+def masked(folder: Path, image: Path) -> Path:
+    virtual = folder / "v.vrt"
+    rasterio.shutil.copy(image, virtual, driver="VRT")
+    return virtual
+
+
+def with_a_mask_beside(folder: Path, image: Path) -> Path:
+    virtual = masked(folder, image)
+    text = virtual.read_text()
+    virtual.write_text(text[: text.index("<MaskBand>")] + "</VRTDataset>")
+    beside = np.indices(VALUES.shape[1:]).sum(axis=0) % 3 * 127
+    path = write_raster(folder / "m.tif", beside.astype(np.uint8))
+    with rasterio.open(path, "r+") as dataset:
+        dataset.update_tags(INTERNAL_MASK_FLAGS_1="2", INTERNAL_MASK_FLAGS_2="2")
+    path.rename(folder / "v.vrt.msk")
+    return virtual
+
+
+def with_masks_of_its_bands(folder: Path, image: Path) -> Path:
+    virtual = masked(folder, image)
+    text = virtual.read_text()
+    for band in (2, 1):
+        source = f"<SourceFilename relativeToVRT='1'>{image.name}</SourceFilename>"
+        pixels = f"<SimpleSource>{source}<SourceBand>{band}</SourceBand></SimpleSource>"
+        mask = f"<MaskBand><VRTRasterBand dataType='Byte'>{pixels}</VRTRasterBand></MaskBand>"
+        # A valid pixel is one that is not 0 in the other band.
+        place = text.index(f'band="{3 - band}"')
+        end = text.index("</VRTRasterBand>", place)
+        text = text[:end] + mask + text[end:]
+    start, end = text.rindex("<MaskBand>"), text.rindex("</VRTDataset>")
+    virtual.write_text(text[:start] + text[end:])
+    return virtual
+
+
+def raw(folder: Path, _: Path) -> Path:
+    (folder / "raw.bin").write_bytes(VALUES[0].tobytes())
+    virtual = folder / "v.vrt"
+    virtual.write_text(
+        f"""<VRTDataset rasterXSize="70" rasterYSize="50"><SRS>{UTM.to_wkt()}</SRS>
+        <GeoTransform>{", ".join(map(str, GRID.transform.to_gdal()))}</GeoTransform>
+        <VRTRasterBand dataType="Byte" band="1" subClass="VRTRawRasterBand">
+        <SourceFilename relativetoVRT="1">raw.bin</SourceFilename><PixelOffset>1</PixelOffset>
+        <LineOffset>70</LineOffset></VRTRasterBand></VRTDataset>"""
+    )
+    return virtual
+
+
+def warped(folder: Path, image: Path) -> Path:
+    virtual = folder / "v.vrt"
+    with rasterio.open(image) as dataset, WarpedVRT(dataset, add_alpha=True) as moved:
+        rasterio.shutil.copy(moved, virtual, driver="VRT")
+    return virtual
+
+
+def pansharpened(folder: Path, image: Path) -> Path:
+    virtual = folder / "v.vrt"
+    named = f"<SourceFilename relativeToVRT='1'>{image.name}</SourceFilename><SourceBand>"
+    bands = "".join(
+        f"<VRTRasterBand dataType='Byte' band='{band}' subClass='VRTPansharpenedRasterBand'/>"
+        for band in (1, 2)
+    )
+    spectral = "".join(
+        f"<SpectralBand dstBand='{band}'>{named}{band}</SourceBand></SpectralBand>"
+        for band in (1, 2)
+    )
+    virtual.write_text(
+        f"<VRTDataset subClass='VRTPansharpenedDataset'>{bands}<PansharpeningOptions>"
+        f"<PanchroBand>{named}1</SourceBand></PanchroBand>{spectral}"
+        "</PansharpeningOptions></VRTDataset>"
+    )
+    return virtual
+
+
+@pytest.mark.parametrize(
+    "make",
+    [masked, with_a_mask_beside, with_masks_of_its_bands, raw, warped, pansharpened],
+)
+def test_a_virtual_raster_is_shown_in_another_place_as_it_is(
+    tmp_path: Path, image: Path, make: Callable[[Path, Path], Path]
+) -> None:
+    """Also with another file of the same name where a copy of it would look for one."""
+    virtual, output = make(image.parent, image), tmp_path / "out" / "b.vrt"
+    for name in ("a.tif", "raw.bin"):
+        (tmp_path / "out" / name).write_bytes(bytes(5000))
+    groundtie.warp(virtual, output, transform=stored(tmp_path / "t.json", SHIFT))
+    moved = tmp_path.with_name(f"{tmp_path.name}-moved")
+    tmp_path.rename(moved)
+    try:
+        with rasterio.open(moved / "out/b.vrt") as shown, rasterio.open(moved / "in/v.vrt") as own:
+            np.testing.assert_array_equal(shown.read(), own.read())
+            np.testing.assert_array_equal(shown.read_masks(), own.read_masks())
+            assert own.read().any()
+            assert shown.mask_flag_enums == own.mask_flag_enums
+            assert (shown.crs, shown.colorinterp) == (own.crs, own.colorinterp)
+            assert shown.transform.c == own.transform.c - 33
+    finally:
+        moved.rename(tmp_path)
+
+
+def test_a_virtual_raster_of_a_virtual_one_reads_its_overviews(tmp_path: Path) -> None:
+    path = write_raster(tmp_path / "in" / "a.tif", VALUES, GRID, nodata=3)
+    with rasterio.open(path, "r+") as dataset:
+        dataset.build_overviews([2])
+        dataset.descriptions = ("VV", "VH")
+    first, second = tmp_path / "out" / "1.vrt", tmp_path / "out" / "2.vrt"
+    transform = stored(tmp_path / "t.json", SHIFT)
+    groundtie.warp(masked(path.parent, path), first, transform=transform)
+    groundtie.warp(first, second, transform=transform)
+    with rasterio.open(path) as original, rasterio.open(second) as moved:
+        assert moved.nodatavals == (3, 3)
+        assert moved.descriptions == ("VV", "VH")
+        with rasterio.open(first) as between:
+            assert moved.tags()["GROUNDTIE_RUN"] != between.tags()["GROUNDTIE_RUN"]
+        reduced = [dataset.read(out_shape=(2, 25, 35)) for dataset in (original, moved)]
+    np.testing.assert_array_equal(*reduced)
+
+
+def test_links_to_folders_lead_nowhere_else(tmp_path: Path, image: Path) -> None:
+    """A parent is that of the folder where a link leads."""
+    (tmp_path / "far" / "out").mkdir(parents=True)
+    write_raster(tmp_path / "far" / "a.tif", 200 - VALUES, GRID)
+    (image.parent / "link").symlink_to(tmp_path / "far" / "out")
+    (tmp_path / "out" / "link").symlink_to(image.parent)
+    transform = stored(tmp_path / "t.json", SHIFT)
+    groundtie.warp(image, image.parent / "link" / "b.vrt", transform=transform)
+    groundtie.warp(tmp_path / "out/link/a.tif", tmp_path / "far/out/c.vrt", transform=transform)
+    for name in ("in/link/b.vrt", "far/out/b.vrt", "in/link/c.vrt"):
+        with rasterio.open(tmp_path / name) as moved:
+            np.testing.assert_array_equal(moved.read(), VALUES)
 
 
 def test_what_located_the_pixels_before_is_left_out(tmp_path: Path, image: Path) -> None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import rasterio
 import rasterio.shutil
+from rasterio.enums import MaskFlags
 
 from ..errors import ParameterError
 from ..runs import RUN_TAG, run_tags
 from .atomic import scratch_file, writing
 from .grid import Grid
+from .metadata import stated
 from .reading import RasterSource
 from .remote import environment
 
@@ -27,6 +31,25 @@ _PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 # What else would locate the pixels, or is of the file that they are in.
 _OWN = ("GCPList", "GeoTransform")
 _OWN_DOMAINS = ("RPC", "GEOLOCATION", "DERIVED_SUBDATASETS")
+
+# The domain in which GDAL has the text of a virtual raster, and the only key there.
+_TEXT = "xml:VRT"
+
+# What a virtual raster states of its pixels, and a band of its own; the rest makes them.
+_STATED = ("SRS", "Metadata", "VRTRasterBand")
+_STATED_OF_BAND = (
+    "Description",
+    "Metadata",
+    "UnitType",
+    "Offset",
+    "Scale",
+    "CategoryNames",
+    "ColorInterp",
+    "ColorTable",
+    "GDALRasterAttributeTable",
+    "NoDataValue",
+    "HideNoDataValue",
+)
 
 
 def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
@@ -53,9 +76,10 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
     if not source.is_file:
         raise ParameterError(f"a {SUFFIX} refers to a file, which {source.path} is not")
     name = _absolute(source.path)
-    with writing(path), scratch_file(path) as scratch, environment(source.path):
-        rasterio.shutil.copy(name, scratch, driver="VRT")
-        root = ElementTree.parse(scratch).getroot()
+    with writing(path), environment(source.path):
+        with rasterio.open(name) as dataset:
+            is_virtual = dataset.driver == "VRT"
+            root = _showing_virtual(dataset, name) if is_virtual else _showing(dataset, path)
         for element in root.iter("SourceFilename"):
             if element.text == name and os.path.exists(name):
                 element.text = _relative(name, path.parent)
@@ -70,6 +94,52 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
             tag = ElementTree.SubElement(ElementTree.SubElement(root, "Metadata"), "MDI", key=key)
             tag.text = value
         ElementTree.ElementTree(root).write(path, encoding="utf-8")
+
+
+def _showing(dataset: Any, path: Path) -> ElementTree.Element:
+    """Return a virtual raster of a raster that is none itself; `path` is staged."""
+    with scratch_file(path) as scratch:
+        rasterio.shutil.copy(dataset, scratch, driver="VRT")
+        return ElementTree.parse(scratch).getroot()
+
+
+def _showing_virtual(dataset: Any, name: str) -> ElementTree.Element:
+    """Return a virtual raster of a virtual raster.
+
+    GDAL would copy what that one is made of, and take names for relative to the copy which are
+    relative to the original.
+    """
+    root = ElementTree.fromstring(dataset.tags(ns=_TEXT)[_TEXT])
+    size = {key: root.attrib[key] for key in ("rasterXSize", "rasterYSize")}
+    made = ElementTree.Element(root.tag, size)
+    made.extend(element for element in root if element.tag in _STATED)
+    flags = stated(lambda: dataset.mask_flag_enums)
+    for number, element in enumerate(made.findall("VRTRasterBand"), start=1):
+        kind, described = element.attrib["dataType"], list(element)
+        element.clear()
+        element.attrib |= {"dataType": kind, "band": str(number)}
+        element.extend(part for part in described if part.tag in _STATED_OF_BAND)
+        element.append(_pixels(name, str(number)))
+        if not flags[number - 1]:
+            element.append(_mask(name, number))
+    if flags[0] == [MaskFlags.per_dataset]:
+        made.append(_mask(name, 1))
+    return made
+
+
+def _pixels(name: str, band: str) -> ElementTree.Element:
+    element = ElementTree.Element("SimpleSource")
+    ElementTree.SubElement(element, "SourceFilename", relativeToVRT="0").text = name
+    ElementTree.SubElement(element, "SourceBand").text = band
+    return element
+
+
+def _mask(name: str, band: int) -> ElementTree.Element:
+    element = ElementTree.Element("MaskBand")
+    ElementTree.SubElement(element, "VRTRasterBand", dataType="Byte").append(
+        _pixels(name, f"mask,{band}")
+    )
+    return element
 
 
 def _absolute(name: str) -> str:
@@ -88,7 +158,10 @@ def _absolute(name: str) -> str:
 
 
 def _relative(name: str, folder: Path) -> str:
+    # Systems follow links before they go up to a parent. What a link to the file itself is called
+    # counts: by that GDAL finds what lies beside it.
+    place = os.path.join(os.path.realpath(os.path.dirname(name)), os.path.basename(name))
     try:
-        return os.path.relpath(name, folder)
+        return os.path.relpath(place, os.path.realpath(folder))
     except ValueError:  # another disk of Windows
         return name
