@@ -217,6 +217,25 @@ def test_a_raster_of_another_place_is_refused(tmp_path: Path) -> None:
         warp(path, tmp_path / "out.tif", stored(tmp_path / "t.json"))
 
 
+def test_a_result_without_a_valid_pixel_is_refused(tmp_path: Path) -> None:
+    """An older one is kept."""
+    image = np.ones((100, 120), np.uint8)
+    image[:, :60] = 0
+    path = write_raster(tmp_path / "a.tif", image, GRID, nodata=0)
+    empty = write_raster(tmp_path / "r.tif", np.ones((60, 30), np.uint8), utm_grid(30, 60))
+    transform = stored(tmp_path / "t.json")
+    (tmp_path / "out.tif").write_text("old")
+    before = sorted(os.listdir(tmp_path))
+    with pytest.raises(NoOverlapError, match=r"would hold no data: .*a\.tif has no valid pixels"):
+        warp(path, tmp_path / "out.tif", transform, empty)
+    assert sorted(os.listdir(tmp_path)) == before
+    assert (tmp_path / "out.tif").read_text() == "old"
+    line = write_raster(tmp_path / "l.tif", np.ones((1, 120), np.uint8), GRID.window(0, 50, 120, 1))
+    with pytest.raises(NoOverlapError, match=r"or fewer than make one of its pixels"):
+        warp(line, tmp_path / "new.tif", transform, pixel_size=40)
+    assert not (tmp_path / "new.tif").exists()
+
+
 def test_a_reference_of_another_place_is_refused(tmp_path: Path) -> None:
     path, transform = misregistered(tmp_path / "a.tif"), stored(tmp_path / "t.json")
     far = write_raster(tmp_path / "r.tif", np.ones((9, 9), np.uint8), GRID.window(5000, 0, 9, 9))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..context import Context
-from ..errors import ParameterError
+from ..errors import NoOverlapError, ParameterError
 from ..geometry.transform import FloatArray, Transform
 from ..kinds import AUTO
 from ..rasters.atomic import Outputs
@@ -77,6 +77,11 @@ class RegisteredOutput:
             Where the file is staged.
         context
             Threads and progress.
+
+        Raises
+        ------
+        NoOverlapError
+            No pixel of a raster that is resampled would be valid.
         """
         staged, progress = outputs.stage(self.path), context.progress
         if grid_of_output(self.path, self.grid) == UNTOUCHED:
@@ -87,10 +92,14 @@ class RegisteredOutput:
                 write_with_geotransform(source, moved, staged, progress=progress)
             return moved
         to_px, target = resampled_onto(self.grid, source, reference, transform)
-        workers = context.workers
-        warp_raster(
-            source, to_px, target, staged, self.resampling, workers=workers, progress=progress
-        )
+        method, workers = self.resampling, context.workers
+        if not warp_raster(
+            source, to_px, target, staged, method, workers=workers, progress=progress
+        ):
+            raise NoOverlapError(
+                f"the registered raster would hold no data: {source.path} has no valid pixels "
+                "where its grid lies, or fewer than make one of its pixels"
+            )
         return target
 
 
