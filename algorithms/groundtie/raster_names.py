@@ -46,6 +46,21 @@ _RPC_ENDINGS = (".rpb", "_rpc.txt")
 _WITH_RPCS = (".tif", ".tiff", ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", ".til", ".vrt")
 
 
+# What GDAL places a GeoTIFF by that states no place itself, in place of its suffix and in any case.
+_WORLD_ENDINGS = (".tfw", ".tifw", ".tiffw", ".wld", ".tab")
+
+# Rasters that may have one of these.
+_WITH_WORLD_FILES = (
+    *_WITH_RPCS,
+    *(".png", ".jpg", ".jpeg", ".gif", ".bmp", ".webp", ".ecw", ".sid"),
+    *(".bil", ".bip", ".bsq", ".dat", ".raw"),
+)
+
+# What the table of a raster states; those of vector layers, of the same ending, do not.
+_TABLE_OF_RASTER = re.compile(rb'^\s*type\s+"?raster\b', re.I | re.M)
+_SEARCHED_BYTES = 10_000
+
+
 def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Path | str:
     """Return what a name means: a `Path` of a file, or GDAL's own name as text.
 
@@ -150,9 +165,33 @@ def is_rpc_file_of(path: Path, raster: Path) -> bool:
 
 def is_only_raster_of_its_name(path: Path) -> bool:
     """Return whether no other raster lies there that has the same RPC files."""
+    return _is_only_one_of(path, _WITH_RPCS)
+
+
+def own_world_files(path: Path) -> list[Path]:
+    """Return the world files and tables beside a GeoTIFF that are no other raster's, too.
+
+    GDAL takes them for its georeferencing if it has none. Of other paths there are none.
+    """
+    if path.suffix.lower() not in (".tif", ".tiff") or not _is_only_one_of(path, _WITH_WORLD_FILES):
+        return []
+    wanted = [path.stem.lower() + ending for ending in _WORLD_ENDINGS]
+    found = [path.with_name(name) for name in _names_beside(path) if name.lower() in wanted]
+    return [one for one in found if one.suffix.lower() != ".tab" or _is_of_raster(one)]
+
+
+def _is_of_raster(table: Path) -> bool:
+    try:
+        with table.open("rb") as file:
+            return _TABLE_OF_RASTER.search(file.read(_SEARCHED_BYTES)) is not None
+    except OSError:
+        return False
+
+
+def _is_only_one_of(path: Path, suffixes: tuple[str, ...]) -> bool:
     others = (Path(name) for name in _names_beside(path) if name != path.name)
     same = (other for other in others if other.stem.lower() == path.stem.lower())
-    return all(other.suffix.lower() not in _WITH_RPCS for other in same)
+    return all(other.suffix.lower() not in suffixes for other in same)
 
 
 def _rpc_names(raster: Path) -> list[str]:

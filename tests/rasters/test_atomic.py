@@ -104,6 +104,64 @@ def test_rpcs_of_another_raster_stay(tmp_path: Path, other: str) -> None:
     assert sorted(os.listdir(tmp_path)) == sorted([other, "image.RPB", "image.tif"])
 
 
+WORLD = "10\n0\n0\n-10\n500005\n5299995\n"
+TABLE = """!table
+!version 300
+Definition Table
+  File "image.tif"
+  Type "RASTER"
+  (500000,5300000) (0,0) Label "1",
+  (500040,5300000) (4,0) Label "2",
+  (500000,5299960) (0,4) Label "3"
+  CoordSys Earth Projection 8, 104, "m", 15, 0, 0.9996, 500000, 0
+  Units "m"
+"""
+
+
+@pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("image.tfw", WORLD), ("IMAGE.TFW", WORLD), ("image.wld", WORLD), ("image.tab", TABLE)],
+)
+def test_world_files_of_an_older_raster_disappear(tmp_path: Path, name: str, text: str) -> None:
+    """GDAL would take them for the georeferencing of one that has none."""
+    pixels = np.ones((4, 4), np.uint8)
+    write_raster(tmp_path / "image.tif", pixels)
+    (tmp_path / name).write_text(text)
+    with rasterio.open(tmp_path / "image.tif") as dataset:
+        assert dataset.transform.a == 10
+    with Outputs() as outputs:
+        write_raster(outputs.stage(tmp_path / "image.tif"), pixels)
+    with rasterio.open(tmp_path / "image.tif") as dataset:
+        assert dataset.transform.is_identity
+        assert dataset.crs is None
+    assert os.listdir(tmp_path) == ["image.tif"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".vrt", ".png"])
+def test_world_files_are_removed_for_geotiffs_alone(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / "image.wld").write_text(WORLD)
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / f"image{suffix}").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted(["image.wld", f"image{suffix}"])
+
+
+@pytest.mark.parametrize("other", ["image.png", "IMAGE.JPG", "image.tiff"])
+def test_world_files_of_another_raster_stay(tmp_path: Path, other: str) -> None:
+    for name in (other, "image.wld"):
+        (tmp_path / name).write_text(WORLD)
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / "image.tif").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted([other, "image.tif", "image.wld"])
+
+
+def test_the_table_of_a_vector_layer_stays(tmp_path: Path) -> None:
+    (tmp_path / "image.tab").write_text(TABLE.replace('"RASTER"', "NATIVE Charset"))
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / "image.tif").write_text("new")
+    assert sorted(os.listdir(tmp_path)) == ["image.tab", "image.tif"]
+
+
 def test_rpcs_are_removed_for_rasters_alone(tmp_path: Path) -> None:
     for name in ("image_RPC.TXT", "other.RPB"):
         (tmp_path / name).write_text("old")

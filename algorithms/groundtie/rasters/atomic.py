@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import GroundTieError, OutputError, raised_by
-from ..raster_names import is_only_raster_of_its_name, rpc_files
+from ..raster_names import is_only_raster_of_its_name, own_world_files, rpc_files
 from ..runs import has_written, run_tags, will_make
 from .hidden_files import Claim, final_name, hidden_name, new_token, remove
 
@@ -38,8 +38,8 @@ class Outputs:
     Inside the `with` block they are written under hidden names in the folders of their final
     names. Leaving the block renames them, in the order in which they were staged; leaving it by an
     exception removes them. Sidecar files (`.aux.xml`) go along, just before their files; those of a
-    file that is replaced (`.msk`, `-wal`, RPCs, …) disappear. What runs that died left in these
-    folders is removed.
+    file that is replaced (`.msk`, `-wal`, RPCs, world files, …) disappear. What runs that died left
+    in these folders is removed.
     """
 
     def __init__(self) -> None:
@@ -142,10 +142,10 @@ class Outputs:
 
     def _stale(self, final: Path) -> list[Path]:
         """Return what lies beside a file and would be wrong for another one of its name."""
-        # GDAL takes what RPCs lie beside a raster for the raster's own.
+        # GDAL takes what RPCs lie beside a raster for the raster's own, and world files, too.
         rpcs = [path for path in rpc_files(final) if path not in self._staged]
         is_own = bool(rpcs) and is_only_raster_of_its_name(final)
-        return [*_sidecars(final), *(rpcs if is_own else ())]
+        return [*_sidecars(final), *(rpcs if is_own else ()), *own_world_files(final)]
 
     def _undo(self, made: list[Path]) -> None:
         for path in made:
