@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -191,6 +192,54 @@ def test_decibels_are_refused(tmp_path: Path, dtype: str, values: str) -> None:
     path = write_raster(tmp_path / "in.tif", decibels)
     with pytest.raises(RasterContentError, match="below 0"):
         filter_speckle(path, tmp_path / "out.tif", values=values)
+    assert not (tmp_path / "out.tif").exists()
+
+
+def stating(path: Path, image: np.ndarray, **states: list[Any]) -> Path:
+    """Write an image that states some of units, scales, offsets, descriptions of its bands."""
+    with rasterio.open(write_raster(path, image), "r+") as dataset:
+        for name, values in states.items():
+            setattr(dataset, name, values)
+    return path
+
+
+@pytest.mark.parametrize("unit", ["dB", "db", "DB", "Decibel", "sigma0_db"])
+@pytest.mark.parametrize("place", [0.0, -60.0])
+def test_decibels_are_refused_that_are_stored_as_numbers_above_0(
+    tmp_path: Path, place: float, unit: str
+) -> None:
+    decibels = 20 * np.log10(amplitude())
+    stored = np.rint((decibels - place) * 100).astype(np.uint16)
+    path = stating(tmp_path / "in.tif", stored, scales=[0.01], offsets=[place], units=[unit])
+    with pytest.raises(RasterContentError, match=r"in\.tif is in decibels"):
+        filter_speckle(path, tmp_path / "out.tif")
+    assert not (tmp_path / "out.tif").exists()
+
+
+@pytest.mark.parametrize("looks", [None, LOOKS])
+def test_numbers_with_an_offset_are_refused(tmp_path: Path, looks: float | None) -> None:
+    image = np.rint(amplitude()).astype(np.uint16)
+    path = stating(tmp_path / "in.tif", image, scales=[0.5], offsets=[-100.0])
+    with pytest.raises(RasterContentError, match=r"in\.tif states an offset \(-100\)"):
+        filter_speckle(path, tmp_path / "out.tif", looks=looks)
+    assert not (tmp_path / "out.tif").exists()
+
+
+def test_numbers_with_a_scale_and_another_unit_are_filtered(tmp_path: Path) -> None:
+    image = np.rint(amplitude()).astype(np.uint16)
+    plain = filter_speckle(write_raster(tmp_path / "in.tif", image), tmp_path / "plain.tif")
+    path = stating(tmp_path / "in.tif", image, scales=[0.01], units=["dBase"])
+    scaled = filter_speckle(path, tmp_path / "out.tif")
+    np.testing.assert_array_equal(read(scaled.output), read(plain.output))
+
+
+def test_a_palette_is_refused(tmp_path: Path) -> None:
+    image = (amplitude() / 40).clip(0, 255).astype(np.uint8)
+    path = write_raster(tmp_path / "in.tif", image)
+    with rasterio.open(path, "r+") as dataset:
+        dataset.write_colormap(1, {value: (value, value, value, 255) for value in range(256)})
+    with pytest.raises(RasterContentError, match=r"in\.tif has a palette"):
+        filter_speckle(path, tmp_path / "out.tif")
     assert not (tmp_path / "out.tif").exists()
 
 

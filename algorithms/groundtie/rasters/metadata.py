@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -19,6 +20,9 @@ T = TypeVar("T")
 # Ten years of daily images are 3653 bands. Each band costs calls of GDAL, which one file of 14 kB
 # can ask for 65,535 times.
 MOST_BANDS = 4096
+
+# Also as the unit of something: "sigma0_db".
+_DECIBEL = re.compile(r"(?<![a-z])(db|decibels?)(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,11 @@ class BandInfo:
     def plain(cls, dtype: str, nodata: float | None = None) -> BandInfo:
         """Return a grey band of which nothing else is stated."""
         return cls(dtype, nodata, ColorInterp.gray, None, None, 1.0, 0.0, {})
+
+    @property
+    def is_in_decibels(self) -> bool:
+        """Whether its unit states so."""
+        return self.unit is not None and _DECIBEL.search(self.unit) is not None
 
     @classmethod
     def all_of(cls, dataset: Any) -> tuple[BandInfo, ...]:

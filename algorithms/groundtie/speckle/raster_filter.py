@@ -63,9 +63,10 @@ class RasterFilter:
         Raises
         ------
         RasterContentError
-            A valid pixel is below 0.
+            A valid pixel is below 0, or see `require_linear`.
         """
         source = self.source
+        require_linear(source)
         require_workable(source.grid, source.path)
         workers, masked = context.workers, source.has_mask_band
         with create_like(
@@ -113,6 +114,27 @@ class RasterFilter:
         return filtered if source.is_complex else np.where(valid, filtered, values)
 
 
+def require_linear(source: RasterSource) -> None:
+    """Raise `RasterContentError` if stored numbers are not proportional to what they stand for."""
+    name = source.path
+    if source.colormap is not None:
+        raise RasterContentError(
+            f"{name} has a palette: its pixels are numbers of colours, not amplitudes or "
+            "intensities"
+        )
+    for band in (source.bands[number - 1] for number in source.image_bands):
+        if band.is_in_decibels:
+            raise RasterContentError(
+                f"{name} is in decibels, by the unit that it states: make it linear before"
+            )
+        if band.offset != 0:
+            raise RasterContentError(
+                f"{name} states an offset ({band.offset:g}), so its numbers as stored are not "
+                "proportional to amplitudes or intensities: apply it before (gdal_translate "
+                "-unscale -ot Float32)"
+            )
+
+
 def _as_amplitudes(source: RasterSource) -> RasterSource:
     # No number is free for nodata: amplitudes may be 0, and complex numbers may have any parts.
     bands = tuple(
@@ -154,8 +176,9 @@ def looks_of(source: RasterSource, values: str) -> float:
     Raises
     ------
     RasterContentError
-        No pixel there is valid, or one is below 0.
+        No pixel there is valid, or one is below 0, or see `require_linear`.
     """
+    require_linear(source)
     middle = middle_window(source.grid)
     bands, valid = source.read_bands(middle, source.image_bands[:1])
     if not valid.any():
