@@ -193,6 +193,34 @@ def test_a_line_of_several_parts_is_refused(tmp_path: Path) -> None:
         read_tie_points(path, GRID)
 
 
+def test_the_line_of_a_collection_counts(tmp_path: Path) -> None:
+    for name in ("a.geojson", "b.geojson"):
+        write(tmp_path / name)
+    for name in ("a.geojson", "b.geojson"):
+        collection = json.loads((tmp_path / name).read_text())
+        move(collection["features"], 0, 1, (1e-3, 0.0))
+        if name == "b.geojson":
+            feature = collection["features"][0]
+            inner = {"type": "GeometryCollection", "geometries": [feature["geometry"]]}
+            point = {"type": "Point", "coordinates": [0, 0]}
+            feature["geometry"] = {"type": "GeometryCollection", "geometries": [point, inner]}
+        (tmp_path / name).write_text(json.dumps(collection))
+    line, within = (read_tie_points(tmp_path / name, GRID) for name in ("a.geojson", "b.geojson"))
+    assert within.more[EDITED].sum() == 1
+    np.testing.assert_array_equal(within.reference_xy, line.reference_xy)
+
+
+def test_a_collection_of_two_lines_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    write(path)
+    collection = json.loads(path.read_text())
+    feature = collection["features"][0]
+    feature["geometry"] = {"type": "GeometryCollection", "geometries": [feature["geometry"]] * 2}
+    path.write_text(json.dumps(collection))
+    with pytest.raises(TransformFileError, match="several parts"):
+        read_tie_points(path, GRID)
+
+
 @pytest.mark.parametrize(
     ("kind", "coordinates"),
     [("LineString", []), ("MultiLineString", []), ("MultiLineString", [[]])],

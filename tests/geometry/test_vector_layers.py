@@ -54,6 +54,29 @@ def test_what_a_layer_holds(layer: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         found.on_map(None)
 
 
+def test_collections_are_taken_apart_with_their_attributes(tmp_path: Path) -> None:
+    """GeoJSON may nest them (RFC 7946, 3.1.8)."""
+    point = {"type": "Point", "coordinates": [9.0, 45.0]}
+    area = {"type": "Polygon", "coordinates": [RING]}
+    inner = {"type": "GeometryCollection", "geometries": [area]}
+    empty = {"type": "GeometryCollection", "geometries": []}
+    outer = {"type": "GeometryCollection", "geometries": [point, inner, empty]}
+    path = tmp_path / "a.geojson"
+    features = [
+        {"type": "Feature", "geometry": geometry, "properties": {"number": number}}
+        for number, geometry in enumerate([outer, empty, area])
+    ]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    found = read_vector_layer(path).on_map(UTM)
+    kinds = [(one["geometry"]["type"], one["properties"]["number"]) for one in found.features]
+    assert kinds == [("Point", 0), ("Polygon", 0), ("Polygon", 2)]
+    first, last = (found.features[index]["geometry"]["coordinates"] for index in (1, 2))
+    assert first == last
+    assert found.features[0]["geometry"]["coordinates"] == pytest.approx(
+        (500_000, 4_982_950), abs=5
+    )
+
+
 def test_a_crash_is_an_error_of_the_layer(
     layer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -49,6 +49,23 @@ def test_a_polygon_takes_in_the_pixels_whose_centres_it_covers(
     assert not chosen.valid[:5].any() and chosen.valid[5:].all()
 
 
+def test_areas_and_lines_of_a_collection_count(scene: Scene, tmp_path: Path) -> None:
+    ring = on_map([(9.6, 19.6), (30.4, 19.6), (30.4, 40.4), (9.6, 40.4), (9.6, 19.6)])
+    parts = [
+        {"type": "Polygon", "coordinates": [ring]},
+        {"type": "LineString", "coordinates": on_map([(60, -20), (60, 100)])},
+    ]
+    path = layer_of(
+        tmp_path / "a.gpkg", {"type": "GeometryCollection", "geometries": parts}, driver="GPKG"
+    )
+    expected = np.zeros((60, 80), bool)
+    expected[20:41, 10:31] = True
+    # 10 m are 5 px.
+    expected[5:, 58:63] = True
+    chosen = read_layer(path, scene, 10.0).select(scene.whole).part
+    np.testing.assert_array_equal(chosen, expected)
+
+
 def test_a_line_is_as_wide_as_told_and_holds_for_every_window(scene: Scene, tmp_path: Path) -> None:
     line = on_map([(-20, 30), (100, 30)])
     path = layer_of(tmp_path / "a.gpkg", {"type": "LineString", "coordinates": line}, driver="GPKG")

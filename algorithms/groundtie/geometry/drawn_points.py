@@ -11,6 +11,7 @@ from rasterio.crs import CRS
 
 from ..rasters.grid import FloatArray, Grid, reproject
 from .point_tables import INPUT, NOMINAL, PIXEL, REFERENCE, Row, columns
+from .vector_layers import simple_geometries
 
 # GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), doubles have 15
 # digits: what differs by no more was not moved.
@@ -34,17 +35,22 @@ def line_ends(geometries: Sequence[Any]) -> FloatArray:
     """
     ends = np.full((len(geometries), 2, 2), np.nan)
     for end, geometry in zip(ends, geometries, strict=True):
-        kind = "" if geometry is None else str(geometry["type"])
-        if not kind.endswith("LineString"):
-            continue
-        coordinates = geometry["coordinates"]
-        parts = coordinates if kind.startswith("Multi") else [coordinates]
-        parts = [part for part in parts if len(part)]
+        parts = [part for one in simple_geometries(geometry) for part in _line_parts(one)]
         if len(parts) > 1:
             raise ValueError("a line has several parts: draw one line for each point")
         for part in parts:
             end[:] = np.array([part[0][:2], part[-1][:2]], float).reshape(2, 2)
     return ends
+
+
+def _line_parts(geometry: Any) -> list[Any]:
+    """Return the coordinates of a geometry's parts, without empty ones, if it is a line."""
+    kind = str(geometry["type"])
+    if not kind.endswith("LineString"):
+        return []
+    coordinates = geometry["coordinates"]
+    parts = coordinates if kind.startswith("Multi") else [coordinates]
+    return [part for part in parts if len(part)]
 
 
 def follow_lines(

@@ -15,8 +15,8 @@ def layer_of(path: str) -> dict[str, Any]:
     """Return the first layer of a vector file as values that JSON can carry.
 
     The keys are `crs_wkt`, `fields` (names of the attributes) and `features`, each with `geometry`
-    (None, or `type` and `coordinates` as GeoJSON has them) and `properties`; or `error`, why the
-    file cannot be read.
+    (None, or `type` and `coordinates` or `geometries` as GeoJSON has them) and `properties`; or
+    `error`, why the file cannot be read.
     """
     import fiona
 
@@ -39,7 +39,12 @@ def layer_of(path: str) -> dict[str, Any]:
 
 
 def _plain(geometry: Any) -> dict[str, Any] | None:
-    if geometry is None or geometry.get("coordinates") is None:
+    if geometry is None:
+        return None
+    if geometry["type"] == "GeometryCollection":
+        parts = filter(None, map(_plain, geometry["geometries"] or ()))
+        return {"type": geometry["type"], "geometries": list(parts)}
+    if geometry.get("coordinates") is None:
         return None
     return {"type": geometry["type"], "coordinates": geometry["coordinates"]}
 

@@ -42,8 +42,7 @@ class VectorLayer:
     fields
         Names of the attributes.
     features
-        Dictionaries with `geometry` (None, or `type` and `coordinates` as in GeoJSON) and
-        `properties`.
+        Dictionaries with `geometry` (None, or as in GeoJSON) and `properties`.
     """
 
     path: str
@@ -54,6 +53,8 @@ class VectorLayer:
     def on_map(self, crs: CRS | None) -> VectorLayer:
         """Return the features that have a geometry, in the CRS of a map.
 
+        Those of a collection become features of their own, with its properties.
+
         Raises
         ------
         GeoreferencingError
@@ -62,7 +63,11 @@ class VectorLayer:
             A geometry cannot be taken to the map.
         """
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
-        located = [feature for feature in self.features if feature["geometry"] is not None]
+        located = [
+            {**feature, "geometry": geometry}
+            for feature in self.features
+            for geometry in simple_geometries(feature["geometry"])
+        ]
         if self.crs is not None and self.crs != crs:
             try:
                 moved = transform_geom(self.crs, crs, [item["geometry"] for item in located])
@@ -75,6 +80,18 @@ class VectorLayer:
                 for item, geometry in zip(located, moved, strict=True)
             ]
         return replace(self, crs=crs, features=tuple(located))
+
+
+def simple_geometries(geometry: Any) -> list[Any]:
+    """Return the geometries of a collection, and of those in it, or the one that is none.
+
+    As GeoJSON has them; of None there is none.
+    """
+    if geometry is None:
+        return []
+    if geometry["type"] != "GeometryCollection":
+        return [geometry]
+    return [simple for part in geometry["geometries"] for simple in simple_geometries(part)]
 
 
 def read_vector_layer(path: str | os.PathLike[str]) -> VectorLayer:
