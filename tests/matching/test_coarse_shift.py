@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +108,52 @@ def test_images_without_content_are_named(
             coarse_candidates(
                 pair, pair.grid, SearchLimits(40.0), SETTINGS, nothing_held_out, context
             )
+
+
+@pytest.mark.parametrize("which", ["reference", "input"])
+@pytest.mark.parametrize(
+    ("content", "shown", "east_m", "text"),
+    [
+        ("texture", 0, 0.0, "the mask of {} leaves nothing of it where the images overlap"),
+        ("texture", 1, 1e5, "the mask of {} leaves nothing of it where the images overlap"),
+        ("nodata", 0, 0.0, "{} has no valid pixel where"),
+        ("half", 1, 0.0, "what its mask leaves of {} is constant where"),
+        ("constant", 1, 0.0, "{} is constant where"),
+    ],
+)
+def test_a_mask_is_named_for_what_it_hides_and_nothing_else(
+    textured: TexturedPair,
+    tmp_path: Path,
+    context: Context,
+    which: str,
+    content: str,
+    shown: int,
+    east_m: float,
+    text: str,
+) -> None:
+    grid = textured.grid
+    values = np.random.default_rng(0).integers(1, 1000, (240, 260)).astype(np.uint16)
+    if content != "texture":
+        # What the mask below shows, and the reach of interpolation around it.
+        values[:200] = 0 if content == "nodata" else 5
+    if content in ("nodata", "constant"):
+        values[200:] = values[0, 0]
+    kept = np.full((240, 260), shown, np.uint8)
+    kept[150:] = 0
+    image = write_raster(tmp_path / "a.tif", values, grid, nodata=0)
+    mask = write_raster(tmp_path / "mask.tif", kept, grid.shifted(east_m, 0.0))
+    paths = {"reference": textured.reference, "input": textured.input} | {which: image}
+    with ExitStack() as stack:
+        images = {
+            name: Image(stack.enter_context(open_raster(path))) for name, path in paths.items()
+        }
+        images[which] = replace(images[which], mask=stack.enter_context(open_raster(mask)))
+        pair = make_pair(images["reference"], images["input"])
+        with pytest.raises(RasterContentError) as error:
+            coarse_candidates(
+                pair, pair.grid, SearchLimits(40.0), SETTINGS, nothing_held_out, context
+            )
+    assert str(error.value).startswith(text.format(image))
 
 
 def test_the_model_of_a_candidate_is_its_shift() -> None:

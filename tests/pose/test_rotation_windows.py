@@ -196,6 +196,18 @@ class TestErrors:
 
 
 @pytest.mark.parametrize("which", [0, 1])
+def test_a_mask_that_leaves_nothing_is_named(tmp_path: Path, which: int) -> None:
+    grid = utm_grid(50, 50)
+    paths = [waves(tmp_path / name, grid) for name in ("a.tif", "b.tif")]
+    mask = write_raster(tmp_path / "mask.tif", np.zeros((50, 50), np.uint8), grid)
+    name = paths[which].name
+    with images(*paths) as pair, open_raster(mask) as hides:
+        pair[which] = Image(pair[which].source, None, hides)
+        with pytest.raises(RasterContentError, match=rf"the mask of .*/{name} leaves nothing"):
+            read_windows(*pair, SCALES)
+
+
+@pytest.mark.parametrize("which", [0, 1])
 def test_masks_of_the_images_hide_what_they_hide(tmp_path: Path, which: int) -> None:
     grid = utm_grid(120, 100)
     paths = [waves(tmp_path / name, grid) for name in ("a.tif", "b.tif")]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..context import Context
-from ..errors import RasterContentError
 from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Model, shift_model
@@ -15,7 +14,7 @@ from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
 from ..rasters.grid import Grid, near_longitude
-from ..rasters.pair import ImagePair
+from ..rasters.pair import Image, ImagePair, require_content
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.description import BORDER_PX
@@ -80,7 +79,7 @@ def coarse_candidates(
     Raises
     ------
     RasterContentError
-        One of the images is constant or has no valid pixel where they overlap.
+        One of the images is constant or has no valid pixel where they overlap, maybe by its mask.
     """
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
@@ -173,11 +172,20 @@ def _patches(
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
         for more in (BORDER_PX, reach)
     )
-    reading = context.executor.submit(pair.reference_patch, template, held_out(template))
-    input = pair.input_patch(search, lambda xy: pair.nominal_px(model(xy)))
+    hidden = held_out(template)
+
+    def of_reference(image: Image) -> Patch:
+        return replace(pair, reference=image).reference_patch(template, hidden)
+
+    def of_input(image: Image) -> Patch:
+        return replace(pair, input=image).input_patch(search, lambda xy: pair.nominal_px(model(xy)))
+
+    reading = context.executor.submit(of_reference, pair.reference)
+    input = of_input(pair.input)
     reference = reading.result()
-    for image, patch in ((pair.reference, reference), (pair.input, input)):
-        _require_content(image.source.path, patch)
+    where = "where the images overlap"
+    require_content(pair.reference, reference, of_reference, where)
+    require_content(pair.input, input, of_input, where)
     return reference, input
 
 
@@ -186,10 +194,3 @@ def _on_map(transform: Transform, level: Grid) -> Model:
     xy = level.pixel_to_map(level.outline(4))
     nominal = near_longitude(transform.nominal_xy(transform(xy)), xy[:, :1], transform.crs)
     return fit_model("affine", xy, nominal)
-
-
-def _require_content(path: str, patch: Patch) -> None:
-    if not patch.valid.any():
-        raise RasterContentError(f"{path} has no valid pixel where the images overlap")
-    if patch.is_flat:
-        raise RasterContentError(f"{path} is constant where the images overlap")

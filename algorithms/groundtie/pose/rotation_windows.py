@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from affine import Affine
 
-from ..errors import NoOverlapError, RasterContentError
+from ..errors import NoOverlapError
 from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
 from ..geometry.models import shift_model
 from ..geometry.transform import Transform
 from ..matching.chips import MaskOf
 from ..rasters.grid import FloatArray, Grid, apply_affine, compose
-from ..rasters.pair import Image, require_georeferenced_alike
+from ..rasters.pair import Image, require_content, require_georeferenced_alike
 from ..rasters.patch import Patch
 from .pose import Pose
 
@@ -113,7 +113,7 @@ def read_windows(
     NoOverlapError
         They do not show common ground.
     RasterContentError
-        One of them is constant or has no valid pixel.
+        One of them is constant or has no valid pixel, maybe by its mask.
     """
     nominal = _nominal(reference, input)
     own = reference.source.grid
@@ -138,21 +138,20 @@ def read_windows(
     pixel = max(own.pixel_size_m, nominal.input_grid.pixel_size_m, longest / LONGEST_PX)
     grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
     # Larger by their last, incomplete pixels, windows still have one centre.
+    hidden = None if held_out is None else held_out(grids[0])
+
+    def of_reference(image: Image) -> Patch:
+        return image.read_onto(grids[0], own.map_to_pixel, hidden)
+
+    def of_input(image: Image) -> Patch:
+        return image.read_onto(grids[1], nominal)
+
     windows = PoseWindows(
-        reference.read_onto(
-            grids[0], own.map_to_pixel, hidden=None if held_out is None else held_out(grids[0])
-        ),
-        input.read_onto(grids[1], nominal),
-        grids[0],
-        grids[1],
-        nominal,
-        radius,
+        of_reference(reference), of_input(input), grids[0], grids[1], nominal, radius
     )
-    for image, patch in ((reference, windows.reference), (input, windows.input)):
-        if not patch.valid.any():
-            raise RasterContentError(f"{image.source.path} has no valid pixel to compare")
-        if patch.is_flat:
-            raise RasterContentError(f"{image.source.path} is constant")
+    where = "where the images are compared"
+    require_content(reference, windows.reference, of_reference, where)
+    require_content(input, windows.input, of_input, where)
     return windows
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import GeoreferencingError, NoOverlapError, SameFileError
+from ..errors import GeoreferencingError, NoOverlapError, RasterContentError, SameFileError
 from ..geometry.limits import SearchLimits
 from .colours import Colours
 from .grid import FloatArray, Grid, PointFunction, finite
@@ -104,6 +105,32 @@ class Image:
     def bands_onto(self, grid: Grid, to_px: PointFunction) -> FloatImage:
         """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
         return sample_bands(self.source, grid, to_px)[0]
+
+
+def require_content(image: Image, patch: Patch, read: Callable[[Image], Patch], where: str) -> None:
+    """Raise `RasterContentError` if a piece of an image shows nothing; it names a mask's doing.
+
+    Parameters
+    ----------
+    image, patch
+        The image, and the piece.
+    read
+        Returns the same piece of another image: of this one without its mask.
+    where
+        What the message calls the piece.
+    """
+    if not patch.is_flat:
+        return
+    unmasked = patch if image.mask is None else read(replace(image, mask=None))
+    name = image.source.path
+    if patch.valid.any():
+        shown = name if unmasked.is_flat else f"what its mask leaves of {name}"
+        raise RasterContentError(f"{shown} is constant {where}")
+    if unmasked.valid.any():
+        raise RasterContentError(
+            f"the mask of {name} leaves nothing of it {where}: it hides all, or lies elsewhere"
+        )
+    raise RasterContentError(f"{name} has no valid pixel {where}")
 
 
 def _to_mask_px(source: RasterSource, mask: RasterSource, to_px: PointFunction) -> PointFunction:
