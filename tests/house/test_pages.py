@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import groundtie
+from groundtie.kinds import RasterOut
 from groundtie.tools import NAMES
 from scripts.make_figures import DRAWN
 
@@ -75,6 +77,19 @@ def test_every_tool_has_a_worked_example(name: str) -> None:
     example = re.search(r"^## Example\n(.*?)^(?:## |<!--)", page, re.MULTILINE | re.DOTALL)
     assert example is not None
     assert f"groundtie {name.replace('_', '-')} " in example[1].replace("\n", " ")
+
+
+def test_the_tools_that_write_virtual_rasters_are_named() -> None:
+    (row,) = re.findall(r"^\| `\.vrt` (.*?) \|", read(DOCS / "files.md"), re.MULTILINE)
+    declared = [
+        name
+        for name in NAMES
+        for parameter in getattr(groundtie, name).__groundtie_tool__.parameters
+        if isinstance(parameter.kind, RasterOut) and ".vrt" in parameter.kind.suffixes
+    ]
+    assert sorted(re.findall(r"\(([a-z-]+)\.md\)", row)) == sorted(
+        name.replace("_", "-") for name in declared
+    )
 
 
 def test_every_figure_is_drawn_shown_and_small() -> None:
