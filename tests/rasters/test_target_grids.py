@@ -54,6 +54,23 @@ def test_cutting_to_the_lattice() -> None:
         covering_grid(GRID, xy + 10_000, within=True)
 
 
+@pytest.mark.parametrize(
+    ("west", "beside"), [(-60.0, True), (300.0, False), (-160.0, True), (200.0, False)]
+)
+def test_a_footprint_in_other_longitudes_is_named_as_such(west: float, beside: bool) -> None:
+    """The footprint counts from 0 to 360, as climate models do; the grid is 50° wide."""
+    grid = Grid(Affine(0.5, 0, west, 0, -0.5, 40), WGS84, 100, 100)
+    footprint = np.array([[0.0, 75.0], [360.0, 75.0], [360.0, -75.0], [0.0, -75.0]])
+    if not beside:
+        assert covering_grid(grid, footprint, within=True) == grid
+        return
+    with pytest.raises(NoOverlapError, match=r"a full turn of longitude beside it.* by 360"):
+        covering_grid(grid, footprint, within=True)
+    # In other latitudes it is elsewhere, however longitudes are counted.
+    with pytest.raises(NoOverlapError, match=r"does not lie on the grid$"):
+        covering_grid(grid, footprint * [1, 0.1] + [0, 60], within=True)
+
+
 def test_positions_that_are_not_finite_do_not_count() -> None:
     xy = np.vstack([GRID.pixel_to_map(GRID.outline()), [[np.inf, np.nan]]])
     assert covering_grid(GRID, xy) == GRID

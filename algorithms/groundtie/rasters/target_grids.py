@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from affine import Affine
+from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from ..errors import GridSizeError, NoOverlapError
@@ -14,6 +15,7 @@ from .grid import (
     Grid,
     PointFunction,
     finite,
+    full_turn,
     is_invertible,
     metres_per_unit_at,
 )
@@ -44,21 +46,46 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
     GridSizeError
         It would have more pixels than a raster can have, or than can be worked through.
     """
-    px = lattice.map_to_pixel(finite(xy))
+    xy = finite(xy)
+    px = lattice.map_to_pixel(xy)
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
     if not (np.abs(px) < MOST_PX).all() and not within:
         raise GridSizeError("the result would have more pixels a side than a raster can have")
+    low, high = _covering_px(lattice, px, within)
+    if np.any(high <= low):
+        raise NoOverlapError(
+            f"the footprint of the image does not lie on the grid{_turned(lattice, xy)}"
+        )
+    return require_workable(lattice.window(*Window.between(low, high)), "the result")
+
+
+def _covering_px(
+    lattice: Grid, px: FloatArray, within: bool
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first pixel that covers positions, shape (n, 2), and the one after the last."""
     px = np.clip(px, -MOST_PX, MOST_PX)
     # By its error alone it needs no further row or column.
     low = np.floor(px.min(axis=0) + 0.5 + POSITION_ERROR_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - POSITION_ERROR_PX).astype(int)
-    if within:
-        size = lattice.size
-        low, high = np.clip(low, 0, size), np.clip(high, 0, size)
-    if np.any(high <= low):
-        raise NoOverlapError("the footprint of the image does not lie on the grid")
-    return require_workable(lattice.window(*Window.between(low, high)), "the result")
+    if not within:
+        return low, high
+    return np.clip(low, 0, lattice.size), np.clip(high, 0, lattice.size)
+
+
+def _turned(lattice: Grid, xy: FloatArray) -> str:
+    """Return words on where a footprint lies that is off a grid in its own longitudes only."""
+    turn = full_turn(lattice.crs)
+    if turn is None:
+        return ""
+    for moved in (xy - [turn, 0], xy + [turn, 0]):
+        low, high = _covering_px(lattice, lattice.map_to_pixel(moved), within=True)
+        if np.all(high > low):
+            return (
+                ", but a full turn of longitude beside it: move the geotransform of one of them "
+                f"by {turn:g}"
+            )
+    return ""
 
 
 def registered_grid(
