@@ -68,6 +68,11 @@ def test_where_sums_are_infinite(nodata: float, hidden: list[float], shown: list
     assert found.tolist() == [True] * len(hidden) + [False] * len(shown)
 
 
+def test_complex_numbers_with_an_imaginary_part_are_data() -> None:
+    values = np.array([-9999, -9998.999, -9999 + 3j, 5], np.complex64)
+    assert is_nodata(values, -9999.0, values.dtype).tolist() == [True, True, False, False]
+
+
 def test_each_band_is_compared_by_its_own_type(tmp_path: Path) -> None:
     """Also where one type holds the pixels of all."""
     integers = np.array([[70_000_000, 70_000_001, 5]], np.int32)

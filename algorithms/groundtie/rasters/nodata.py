@@ -35,15 +35,20 @@ def nodata_range(nodata: float, dtype: np.dtype[Any]) -> tuple[Any, Any]:
 
 
 def is_nodata(values: NDArray[Any], nodata: float, dtype: np.dtype[Any]) -> NDArray[np.bool_]:
-    """Return which values, of pixels of type `dtype`, GDAL takes for a nodata value."""
+    """Return which values, of pixels of type `dtype`, GDAL takes for a nodata value.
+
+    Complex numbers with an imaginary part are none, though their real part alone counts for GDAL:
+    any phase may turn it to the value, which is 0 in many files.
+    """
+    if values.dtype.kind == "c":
+        return np.asarray(is_nodata(values.real, nodata, dtype) & (values.imag == 0))
     low, high = nodata_range(nodata, dtype)
-    part = values.real
     if low == high:
-        return np.asarray(part == low)
+        return np.asarray(values == low)
     # Beyond the end next to 0 lies hardly a pixel with data, and often none: then that is all.
-    beyond = np.asarray(part <= high if high < 0 else part >= low)
+    beyond = np.asarray(values <= high if high < 0 else values >= low)
     if beyond.any():
-        beyond &= part >= low if high < 0 else part <= high
+        beyond &= values >= low if high < 0 else values <= high
     return beyond
 
 
