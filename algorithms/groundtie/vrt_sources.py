@@ -1,4 +1,4 @@
-"""What GDAL's virtual rasters are made of: told from the files, without GDAL."""
+"""What GDAL's virtual rasters are made of: read from the files, without GDAL."""
 
 from __future__ import annotations
 

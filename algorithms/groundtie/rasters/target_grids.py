@@ -112,7 +112,7 @@ def registered_grid(
     pixel_size_m
         Pixel size in metres (in pixels without georeferencing).
     smooth
-        Near to `px_to_map`, and tells how large pixels are; None: that does itself.
+        Near to `px_to_map`, by which pixels are as large as on even ground; None: that itself.
 
     Raises
     ------

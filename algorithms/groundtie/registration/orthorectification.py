@@ -47,7 +47,7 @@ def write_orthoimage(
     if grid is None:
         # Where another georeferencing than the RPCs places the image does not count.
         pixels = source.grid.on_own_pixels()
-        # A wall or a steep slope must not tell how large pixels are.
+        # A wall or a steep slope must not decide how large pixels are.
         smooth = by.to_level_map
         grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size, smooth)
     else:
