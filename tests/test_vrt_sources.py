@@ -68,3 +68,14 @@ def test_names_are_relative_to_where_a_link_leads(tmp_path: Path, image: Path) -
         with rasterio.open(tmp_path / name) as dataset:
             np.testing.assert_array_equal(dataset.read(1), VALUES)
         assert sources_of(tmp_path / name) == [image]
+
+
+def test_what_cannot_be_read_is_made_of_nothing(tmp_path: Path) -> None:
+    """GDAL, which opens the raster, decides what becomes of it."""
+    odd, loop = tmp_path / "odd.vrt", tmp_path / "loop.tif"
+    odd.write_text('<?xml version="1.0" encoding="foo"?><VRTDataset/>')
+    loop.symlink_to("loop.tif")
+    to_loop = tmp_path / "to_loop.vrt"
+    source = '<SourceFilename relativeToVRT="1">loop.tif</SourceFilename>'
+    to_loop.write_text(f"<VRTDataset>{source}</VRTDataset>")
+    assert sources_of(odd) == sources_of(loop) == sources_of(to_loop) == []

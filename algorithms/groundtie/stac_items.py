@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from .errors import ParameterError
-from .raster_names import file_name, located, require_possible
+from .raster_names import file_name, located
 from .strict_json import parse_json
 
 _DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
@@ -87,11 +87,17 @@ def place_of_asset(asset: Mapping[str, Any], place: Path | str) -> Path | str:
     """Return where an asset of an item at `place` lies: a file, or GDAL's name of it.
 
     Catalogues state URLs, in which a file's name is percent-encoded, but many do not encode it.
+
+    Raises
+    ------
+    ParameterError
+        No file can have that name.
     """
     href = str(asset["href"])
-    literal, decoded = located(href, place), located(unquote(href), place)
+    literal = located(href, place)
     if not isinstance(literal, Path):
         return literal
+    decoded = located(unquote(href), place)
     return literal if os.path.exists(literal) and not os.path.exists(decoded) else decoded
 
 
@@ -122,7 +128,7 @@ def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
     Raises
     ------
     ParameterError
-        It cannot be read, is no STAC item or item collection, or names what cannot be a file.
+        It cannot be read, or is no STAC item or item collection.
     """
     place, asset = _split(name)
     try:
@@ -142,10 +148,6 @@ def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
 def _item(place: Path | str, item: Mapping[str, Any]) -> StacItem:
     time = (item.get("properties") or {}).get("datetime")
     assets = {str(name): {"href": one["href"], **one} for name, one in item["assets"].items()}
-    for name, one in assets.items():
-        # All of them, not only the one that is asked for: what an item names is found by all.
-        what = f"the asset {name} of the item {item['id']} in {place}"
-        require_possible(what, unquote(str(one["href"])))
     return StacItem(str(item["id"]), None if time is None else str(time), assets, place)
 
 

@@ -19,7 +19,10 @@ def sources_of(path: Path) -> list[Path]:
     GDAL, which is not asked, names the first ones alone; other rasters are made of none. Links are
     followed, as GDAL does before it takes a name relative to the virtual raster.
     """
-    own = path.resolve()
+    try:
+        own = path.resolve()
+    except (OSError, RuntimeError):  # a loop of links
+        return []
     found: dict[Path, None] = {own: None}
     waiting = [own]
     while waiting:
@@ -36,8 +39,8 @@ def _named_in(path: Path) -> list[Path]:
         root = ElementTree.parse(path).getroot()
         sources = [one for one in root.iter() if one.tag.lower() in _SOURCES and one.text]
         return [_place(one, path.parent).resolve() for one in sources]
-    except (OSError, ElementTree.ParseError, ValueError):
-        return []
+    except (OSError, RuntimeError, ElementTree.ParseError, ValueError, LookupError):
+        return []  # damaged, of an encoding that nobody knows, or a loop of links
 
 
 def _is_virtual(path: Path) -> bool:

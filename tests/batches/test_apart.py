@@ -46,6 +46,18 @@ def test_no_row_may_write_what_another_reads(folders: tuple[Path, Path]) -> None
         check(folders, TOY, ROW, other)
 
 
+def test_no_row_may_write_what_anothers_virtual_input_is_made_of(
+    folders: tuple[Path, Path],
+) -> None:
+    source = '<SourceFilename relativeToVRT="1">mid.tif</SourceFilename>'
+    (folders[0] / "m.vrt").write_text(
+        f"<VRTDataset><VRTRasterBand>{source}</VRTRasterBand></VRTDataset>"
+    )
+    rows = [{**ROW, "output": str(folders[0] / "mid.tif")}, {**ROW, "input": "m.vrt"}]
+    with pytest.raises(OutputError, match=r"row 1 would write what row 2 reads: .*mid\.tif"):
+        check(folders, TOY, *rows)
+
+
 def test_what_lies_beside_an_output_is_no_other_rows(folders: tuple[Path, Path]) -> None:
     pair = {"reference": "a.tif", "input": "b.tif"}
     rows = [{**pair, "report": "r.html"}, {**pair, "transform": "r.json"}]

@@ -296,6 +296,13 @@ def test_several_inputs_are_a_list_or_one_cell(folders: tuple[Path, Path]) -> No
     assert second.outputs == {"output_folder": folders[1] / "again"}
 
 
+def test_an_output_folder_that_none_can_be_costs_no_other_row(folders: tuple[Path, Path]) -> None:
+    row = {"input": "a.tif"}
+    rows = [{**row, "output": "\ud800/x.tif"}, {**row, "output": "y.tif"}]
+    bad, good = make_calls(load_tool("filter_speckle"), rows, *folders, 1)
+    assert "not UTF-8" in bad.problem and good.key and not good.problem
+
+
 @pytest.mark.parametrize("href", ["a\\u0000b.tif", "\\ud800.tif"])
 def test_an_item_of_a_file_that_none_can_be_costs_no_other_row(
     folders: tuple[Path, Path], href: str

@@ -232,9 +232,20 @@ IMPOSSIBLE = ["a\0b.tif", "a%00b.tif", "x/a\0/b.tif", "\ud800.tif"]
 def test_an_asset_that_no_file_can_be_is_one_line(tmp_path: Path, href: str) -> None:
     path = tmp_path / "item.json"
     path.write_text(json.dumps(item(1, red={"href": href, "type": TIFF})))
-    with pytest.raises(ParameterError, match=r"asset red of the item item-1 .* has a name that"):
+    with pytest.raises(ParameterError, match=r"what .*item\.json names has a name that"):
         list_dates([path], None)
-    assert list(files_behind(path)) == [path]
+    assert set(files_behind(path)) == {path}
+
+
+def test_an_asset_that_no_file_can_be_costs_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "item.json"
+    odd = {"href": "https://h/x%00.png", "type": "image/png"}
+    worse = {"href": "x%00.png", "type": "image/png"}
+    path.write_text(json.dumps(item(1, odd=odd, worse=worse, red={"href": "a.tif", "type": TIFF})))
+    (tmp_path / "a.tif").touch()
+    (date,) = list_dates([path], None)
+    assert date.raster == tmp_path / "a.tif"
+    assert tmp_path / "a.tif" in files_behind(path)
 
 
 @pytest.mark.parametrize("column", ["file", "mask"])

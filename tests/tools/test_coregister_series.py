@@ -19,6 +19,7 @@ import fiona
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from loopback_cluster import cluster
 from raster_files import utm_grid, write_raster
 from series_dates import Dates, write_dates
@@ -26,7 +27,7 @@ from textured_pairs import listing, pixels
 
 import groundtie
 from groundtie.cli import main
-from groundtie.errors import NotRegisteredError
+from groundtie.errors import NotRegisteredError, SameFileError
 from groundtie.geometry.transform import Transform
 from groundtie.progress import Progress
 from groundtie.runs import running
@@ -341,6 +342,16 @@ def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
             coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
         assert out.exists() == (folder == "there")
         assert not out.exists() or not [*out.iterdir()]
+
+
+def test_the_output_folder_holds_nothing_that_a_virtual_date_is_made_of(tmp_path: Path) -> None:
+    """A raster of the folder's own dates would be written over it, or it would be removed."""
+    dates = write_dates(tmp_path / "dates", 2, 64)
+    virtual = tmp_path / "virtual.vrt"
+    rasterio.shutil.copy(dates.files[0], virtual, driver="VRT")
+    other = dates.files[1].rename(tmp_path / "other.tif")
+    with pytest.raises(SameFileError, match="the output folder holds an input"):
+        coregister_series(dates.folder, [virtual, other], **OPTIONS)
 
 
 @pytest.mark.parametrize(

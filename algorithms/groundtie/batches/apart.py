@@ -10,6 +10,7 @@ from ..declaration import Tool
 from ..errors import OutputError, SameFileError
 from ..kinds import FolderOut, RastersIn
 from ..series.inputs import would_stand_for
+from ..vrt_sources import sources_of
 from .calls import Call, files_written
 from .input_files import files_read
 
@@ -83,12 +84,13 @@ def _folders(tool: Tool, call: Call) -> Iterator[Path]:
 
 
 def _read(tool: Tool, call: Call) -> Iterator[Path]:
-    """Yield what a call reads: what its inputs name, and what that stands for."""
+    """Yield what a call reads: what its inputs name, what that stands for, and is made of."""
     for parameter in tool.parameters:
         value = call.values.get(parameter.name)
         named = (path for path in inputs_of(parameter.kind, value) if isinstance(path, Path))
         # Most names stand for themselves.
-        yield from dict.fromkeys((*named, *files_read(parameter.kind, value)))
+        for path in dict.fromkeys((*named, *files_read(parameter.kind, value))):
+            yield from (path, *sources_of(path))
 
 
 def _given(tool: Tool, call: Call) -> Iterator[Path]:

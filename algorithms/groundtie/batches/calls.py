@@ -11,7 +11,7 @@ from typing import Any
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, ParameterError
 from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
-from ..raster_names import is_utf8, raster_name
+from ..raster_names import is_utf8, raster_name, require_possible
 from ..rasters.atomic import make_folder
 from ..runs import digest
 from .input_files import Listed, facts_read, names_in
@@ -170,6 +170,7 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
         value = stem + (kind.suffixes[0] if isinstance(kind, OutputKind) else "")
     if not isinstance(value, str):
         raise ParameterError(f"{parameter.name} must be a path, not {value!r}")
+    require_possible(parameter.name, value)
     if "{name}" in value:
         _require_inside(name)
     return folder / value.replace("{name}", name)

@@ -21,6 +21,7 @@ from ..rasters.reading import bounded_cache
 from ..registration.evidence import DateEvidence
 from ..registration.registered_output import model_for_grid
 from ..registration.user_masks import UserMask
+from ..vrt_sources import sources_of
 from .dates import Date, footprint_shares, open_dates
 from .delivery import SeriesFiles
 from .frame import SeriesFrame
@@ -198,10 +199,12 @@ def _is_same(date: Listed, other: Listed) -> bool:
 
 
 def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
-    """Raise an error where outputs would be written among the inputs."""
+    """Raise an error where outputs would be written among the inputs, or what these are made of."""
     folder = folder.resolve()
     for date in listed:
-        if isinstance(date.raster, Path) and date.raster.resolve().parent == folder:
+        if not isinstance(date.raster, Path):
+            continue
+        if folder in (path.parent for path in (date.raster.resolve(), *sources_of(date.raster))):
             raise SameFileError(f"the output folder holds an input: {date.raster}")
 
 

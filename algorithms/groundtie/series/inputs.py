@@ -150,7 +150,9 @@ def _named_in(given: Path) -> Iterator[Path | str]:
     if is_item(given):
         for item in read_items(given)[0]:
             yield item.place
-            yield from (place_of_asset(asset, item.place) for asset in item.assets.values())
+            for asset in item.assets.values():
+                with suppress(ParameterError):
+                    yield place_of_asset(asset, item.place)
     elif given.suffix.lower() in _TABLE:
         for row in read_rows(given):
             yield from (located(row[name], given) for name in ("file", "mask") if name in row)
