@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import io
 import json
 import logging
 import os
@@ -166,6 +167,49 @@ def test_an_error_where_standard_error_is_closed_has_its_exit_code() -> None:
     command = ["sh", "-c", 'exec "$@" 2>&-', "sh", *words]
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, check=False)
     assert (done.returncode, done.stdout) == (3, b"")
+
+
+NUMBERING = f"""
+import dataclasses, os, sys
+import toys
+
+def run(**values):
+    with open("first", "w") as first:
+        print(first.fileno() > 2, *map(os.get_inheritable, range(3)), file=first)
+    return toys.toy(**values)
+
+sys.exit(toys.run_tools({GOOD.split()!r}, [dataclasses.replace(toys.TOY, run=run)]))
+"""
+
+
+@pytest.mark.parametrize("closed", ["<&- 2>&-", "<&- >&- 2>&-"])
+def test_no_file_gets_the_number_of_a_closed_stream(closed: str) -> None:
+    """Libraries would write their messages into it."""
+    command = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-c", NUMBERING]
+    assert subprocess.run(command, env=ENVIRONMENT, check=False).returncode == 0
+    assert Path("first").read_text() == "True True True True\n"
+
+
+@pytest.mark.parametrize("name", ["stdout", "stderr"])
+@pytest.mark.parametrize("end", ["close", "detach"])
+def test_python_may_have_closed_its_streams(
+    name: str, end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = io.TextIOWrapper(io.BytesIO())
+    getattr(stream, end)()
+    monkeypatch.setattr(sys, name, stream)
+    assert run(GOOD) == 0
+    assert run(f"{GOOD} --mode refuse") == 3
+    assert getattr(sys, name) is stream
+
+
+def test_python_has_its_streams_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    written = io.BytesIO()
+    stream = io.TextIOWrapper(written, encoding="latin-1", errors="replace")
+    monkeypatch.setattr(sys, "stdout", stream)
+    assert run_tools([*GOOD.split(), "--title", "1–2"], [TOY]) == 0
+    assert written.getvalue() == b"accepted\nsize 3.0\n1\\u20132\n"
+    assert (sys.stdout, stream.errors) == (stream, "replace")
 
 
 def test_signs_that_the_terminal_does_not_have_cost_no_result() -> None:

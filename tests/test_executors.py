@@ -139,16 +139,23 @@ def run_python(words: list[str], script: str = "") -> subprocess.CompletedProces
 def test_threads_run_where_no_process_may_have_any(
     tmp_path: Path, script: str, is_here: str
 ) -> None:
-    """A worker of Python's own pools is a daemon."""
+    """A worker of `multiprocessing.Pool` is a daemon."""
     path = tmp_path / "script.py"
     path.write_text(script)
     done = run_python([str(path)])
     assert (done.stdout, done.stderr) == (f"{is_here}\n", "")
 
 
-def test_threads_run_where_no_process_could_read_the_program() -> None:
-    done = run_python(["-"], WHERE + GUARDED)
+@pytest.mark.parametrize("program", ["-", "/dev/stdin"])
+def test_threads_run_where_no_process_could_read_the_program(program: str) -> None:
+    """From a pipe it is read once; bash's <(cat script.py) is one by a name, too."""
+    done = run_python([program], WHERE + GUARDED)
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_a_folder_that_is_a_program_starts_processes(tmp_path: Path) -> None:
+    (tmp_path / "__main__.py").write_text(WHERE + GUARDED)
+    assert run_python([str(tmp_path)]).stdout == "False\n"
 
 
 def test_a_session_without_a_program_starts_processes() -> None:
@@ -172,6 +179,34 @@ def test_a_program_without_a_guard_is_told(tmp_path: Path) -> None:
     assert all('if __name__ == "__main__":' in line for line in lines)
     # Not for each task.
     assert done.stderr.count("ParameterError: ") == executors._ATTEMPTS
+
+
+def test_a_program_with_a_guard_is_not_told_that_it_has_none(tmp_path: Path) -> None:
+    path = tmp_path / "script.py"
+    path.write_text(
+        "import os\n"
+        "from groundtie.executors import open_executor\n"
+        "if __name__ == '__main__':\n"
+        "    with open_executor(1) as pool:\n"
+        "        print(pool.submit(os.getpid).exception())\n"
+        "else:\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    assert run_python([str(path)]).stdout == (
+        "no process could be started (out of memory? or by a program that starts some without "
+        'if __name__ == "__main__":)\n'
+    )
+
+
+@pytest.mark.slow
+def test_processes_that_begin_late_run_tasks() -> None:
+    """One that memory ran out for at first tells nothing of the others."""
+    with Processes(1) as pool:
+        pool._have_none_begun.set()
+        with pytest.raises(WorkerLostError, match="no process could be started"):
+            pool.submit(process_number).result()
+        pool._begun.set()
+        assert pool.submit(process_number).result() != os.getpid()
 
 
 class TestScheduler:

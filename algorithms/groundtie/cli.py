@@ -15,7 +15,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, TextIO
 
 import click
@@ -44,10 +44,14 @@ def main(args: Sequence[str] | None = None) -> int:
     int
         The exit code.
     """
-    _open_streams()
-    _silence_libraries()
-    use_one_thread()
-    set_heaps()
+    with _open_streams():
+        _silence_libraries()
+        use_one_thread()
+        set_heaps()
+        return _run(args)
+
+
+def _run(args: Sequence[str] | None) -> int:
     with _signals() as received:
         try:
             command = click.version_option(__version__, message="%(prog)s %(version)s")(ToolGroup())
@@ -74,18 +78,54 @@ def _usage(error: click.ClickException) -> str:
     return message
 
 
-def _open_streams() -> None:
+@contextmanager
+def _open_streams() -> Iterator[None]:
     """Have streams that take every text, so that none costs the result that it is about.
 
-    A closed one swallows it: whatever is opened next would get its number, and so what libraries
-    write there. Signs that an encoding does not have are written by their numbers.
+    Who calls this from Python has the own ones afterwards, as they were.
     """
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+    _take_numbers()
+    with _open_stream(sys.stdout, redirect_stdout), _open_stream(sys.stderr, redirect_stderr):
+        yield
+
+
+def _take_numbers() -> None:
+    """Take the numbers of closed streams: of 0 to 2, the next file that is opened would get one.
+
+    What libraries write to standard error would be written to that file.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest number that is free is this one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+
+
+@contextmanager
+def _open_stream(stream: Any, redirect: Callable[[TextIO], Any]) -> Iterator[None]:
+    """Swallow what is written to a closed stream; write signs that an open one lacks by number."""
+    if _is_closed(stream):
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect(nowhere):
+            yield
+    elif hasattr(stream, "reconfigure"):
+        errors = stream.errors
+        stream.reconfigure(errors="backslashreplace")
+        try:
+            yield
+        finally:
+            # It writes what is left, too: of a full disk or a closed pipe users were told.
+            with suppress(OSError, ValueError):
+                stream.reconfigure(errors=errors)
+    else:
+        yield
+
+
+def _is_closed(stream: Any) -> bool:
+    try:
+        return stream is None or getattr(stream, "closed", False)
+    except ValueError:  # of one without its buffer
+        return True
 
 
 def _silence_libraries() -> None:

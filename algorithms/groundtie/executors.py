@@ -35,7 +35,7 @@ POLL_SECONDS = 0.2
 _ATTEMPTS = 2
 
 # Of programs that start processes, which read them from their beginning.
-_GUARD = 'a program that starts some must do so below if __name__ == "__main__":'
+_GUARD = 'if __name__ == "__main__":'
 
 _here = threading.local()
 
@@ -84,15 +84,19 @@ class Processes(Executor):
         return self._threads.submit(self._run, fn, *args, **kwargs)
 
     def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        # Once none has begun, none will: not tried with each task.
-        for _ in range(0 if self._have_none_begun.is_set() else _ATTEMPTS):
+        # Where none could begin, none is tried with each task until one has begun after all.
+        is_vain = self._have_none_begun.is_set() and not self._begun.is_set()
+        for _ in range(0 if is_vain else _ATTEMPTS):
             try:
                 return self._pool().submit(fn, *args, **kwargs).result()
             except BrokenProcessPool:
                 self._own.pool = None
         if not self._begun.is_set():
             self._have_none_begun.set()
-            raise WorkerLostError(f"no process could be started: {_GUARD}")
+            raise WorkerLostError(
+                "no process could be started (out of memory? or by a program that starts some "
+                f"without {_GUARD})"
+            )
         raise WorkerLostError(
             f"its process was ended {_ATTEMPTS} times, by the system (out of memory?) or somebody"
         )
@@ -150,7 +154,8 @@ def _can_start_processes() -> bool:
     """Return whether this process can start others.
 
     Not inside QGIS, whose Python is no interpreter that could be started, nor in a worker of
-    Python's own pools, nor where the program was read from standard input: each process reads it.
+    `multiprocessing.Pool` (a daemon), nor where the program was read from standard input or a
+    pipe: each process reads it.
 
     Raises
     ------
@@ -163,10 +168,11 @@ def _can_start_processes() -> bool:
         start = spawn.get_preparation_data("")  # what each process begins with
     except RuntimeError as error:
         raise ParameterError(
-            f"this is one of the processes that do the work, and cannot begin it anew: {_GUARD}"
+            "this is one of the processes that do the work, and cannot begin it anew: a program "
+            f"that starts some must do so below {_GUARD}"
         ) from error
     program = start.get("init_main_from_path")
-    is_readable = program is None or os.path.exists(program)
+    is_readable = program is None or os.path.isfile(program)
     return is_readable and not multiprocessing.current_process().daemon
 
 
