@@ -114,7 +114,7 @@ def _open_stream(stream: Any, redirect: Callable[[TextIO], Any]) -> Iterator[Non
         try:
             yield
         finally:
-            # It writes what is left, too: of a full disk or a closed pipe users were told.
+            # It writes what is left, too: a full disk or a closed pipe was reported already.
             with suppress(OSError, ValueError):
                 stream.reconfigure(errors=errors)
     else:
