@@ -49,12 +49,8 @@ _WITH_RPCS = (".tif", ".tiff", ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", 
 # What GDAL places a GeoTIFF by that states no place itself, in place of its suffix and in any case.
 _WORLD_ENDINGS = (".tfw", ".tifw", ".tiffw", ".wld", ".tab")
 
-# Rasters that may have one of these.
-_WITH_WORLD_FILES = (
-    *_WITH_RPCS,
-    *(".png", ".jpg", ".jpeg", ".gif", ".bmp", ".webp", ".ecw", ".sid"),
-    *(".bil", ".bip", ".bsq", ".dat", ".raw"),
-)
+# What never has one of these: tables, reports and stored transforms. Anything else might.
+_WITHOUT_WORLD_FILES = (".csv", ".json", ".geojson", ".gpkg", ".html", ".txt", ".xml", ".rpb")
 
 # What the table of a raster states; those of vector layers, of the same ending, do not.
 _TABLE_OF_RASTER = re.compile(rb'^\s*type\s+"?raster\b', re.I | re.M)
@@ -165,33 +161,36 @@ def is_rpc_file_of(path: Path, raster: Path) -> bool:
 
 def is_only_raster_of_its_name(path: Path) -> bool:
     """Return whether no other raster lies there that has the same RPC files."""
-    return _is_only_one_of(path, _WITH_RPCS)
+    return _suffixes_beside(path).isdisjoint(_WITH_RPCS)
 
 
 def own_world_files(path: Path) -> list[Path]:
-    """Return the world files and tables beside a GeoTIFF that are no other raster's, too.
+    """Return the world files and tables beside a GeoTIFF that are nothing else's, too.
 
     GDAL takes them for its georeferencing if it has none. Of other paths there are none.
     """
-    if path.suffix.lower() not in (".tif", ".tiff") or not _is_only_one_of(path, _WITH_WORLD_FILES):
+    others = _suffixes_beside(path) - {*_WORLD_ENDINGS, *_WITHOUT_WORLD_FILES}
+    if path.suffix.lower() not in (".tif", ".tiff") or others:
         return []
     wanted = [path.stem.lower() + ending for ending in _WORLD_ENDINGS]
     found = [path.with_name(name) for name in _names_beside(path) if name.lower() in wanted]
-    return [one for one in found if one.suffix.lower() != ".tab" or _is_of_raster(one)]
+    return [one for one in found if one.suffix.lower() != ".tab" or _is_of_raster(one, path)]
 
 
-def _is_of_raster(table: Path) -> bool:
+def _is_of_raster(table: Path, raster: Path) -> bool:
     try:
         with table.open("rb") as file:
-            return _TABLE_OF_RASTER.search(file.read(_SEARCHED_BYTES)) is not None
+            text = file.read(_SEARCHED_BYTES)
     except OSError:
         return False
+    is_named = os.fsencode(raster.name).lower() in text.lower()
+    return is_named and _TABLE_OF_RASTER.search(text) is not None
 
 
-def _is_only_one_of(path: Path, suffixes: tuple[str, ...]) -> bool:
+def _suffixes_beside(path: Path) -> set[str]:
+    """Return the endings of other files that are called as one, but for these, in lower case."""
     others = (Path(name) for name in _names_beside(path) if name != path.name)
-    same = (other for other in others if other.stem.lower() == path.stem.lower())
-    return all(other.suffix.lower() not in suffixes for other in same)
+    return {other.suffix.lower() for other in others if other.stem.lower() == path.stem.lower()}
 
 
 def _rpc_names(raster: Path) -> list[str]:

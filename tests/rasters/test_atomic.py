@@ -146,13 +146,31 @@ def test_world_files_are_removed_for_geotiffs_alone(tmp_path: Path, suffix: str)
     assert sorted(os.listdir(tmp_path)) == sorted(["image.wld", f"image{suffix}"])
 
 
-@pytest.mark.parametrize("other", ["image.png", "IMAGE.JPG", "image.tiff"])
+@pytest.mark.parametrize(
+    "other", ["image.png", "IMAGE.JPG", "image.tiff", "image.pgm", "image.dwg", "image"]
+)
 def test_world_files_of_another_raster_stay(tmp_path: Path, other: str) -> None:
     for name in (other, "image.wld"):
         (tmp_path / name).write_text(WORLD)
     with Outputs() as outputs:
         outputs.stage(tmp_path / "image.tif").write_text("new")
     assert sorted(os.listdir(tmp_path)) == sorted([other, "image.tif", "image.wld"])
+
+
+def test_the_table_of_another_raster_stays(tmp_path: Path) -> None:
+    table = '!table\nDefinition Table\n File "b.jpg"\n Type "RASTER"\n'
+    (tmp_path / "image.tab").write_text(table)
+    with Outputs() as outputs:
+        outputs.stage(tmp_path / "image.tif").write_text("new")
+    assert (tmp_path / "image.tab").exists()
+
+
+def test_what_is_withdrawn_is_not_written_and_the_others_are(tmp_path: Path) -> None:
+    with Outputs() as outputs:
+        for name in "ab":
+            outputs.stage(tmp_path / name).write_text("new")
+        outputs.withdraw(tmp_path / "a")
+    assert os.listdir(tmp_path) == ["b"]
 
 
 def test_the_table_of_a_vector_layer_stays(tmp_path: Path) -> None:

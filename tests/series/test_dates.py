@@ -103,11 +103,13 @@ def test_statistics_that_gdal_keeps_make_no_other_date(tmp_path: Path, one_threa
     for name in "ab":
         write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
     before = keys(tmp_path, one_thread)
-    with rasterio.open(tmp_path / "b.tif") as dataset:
-        dataset.stats()
+    # As GDAL does, which each version of rasterio asks in another way.
+    statistics = '<MDI key="STATISTICS_MEAN">7</MDI>'
+    band = f'<PAMRasterBand band="1"><Metadata>{statistics}</Metadata></PAMRasterBand>'
+    (tmp_path / "b.tif.aux.xml").write_text(f"<PAMDataset>{band}</PAMDataset>")
     with rasterio.open(tmp_path / "b.tif") as dataset:
         assert "STATISTICS_MEAN" in dataset.tags(1)
-    assert (tmp_path / "b.tif.aux.xml").exists() and keys(tmp_path, one_thread) == before
+    assert keys(tmp_path, one_thread) == before
 
 
 @pytest.mark.parametrize("is_nested", [False, True])

@@ -23,7 +23,7 @@ import rasterio.shutil
 from loopback_cluster import cluster
 from raster_files import utm_grid, write_raster
 from series_dates import Dates, write_dates
-from textured_pairs import listing, pixels
+from textured_pairs import listing, pixels, texture
 
 import groundtie
 from groundtie.cli import main
@@ -342,6 +342,23 @@ def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
             coregister_series(out, [dates.folder], reference=dates.files[0], **OPTIONS)
         assert out.exists() == (folder == "there")
         assert not out.exists() or not [*out.iterdir()]
+
+
+def test_a_date_beside_the_map_of_the_series_costs_no_other(tmp_path: Path) -> None:
+    """It is reached by the date between; the reference's grid has no pixel of it."""
+    ground, rng = 128 + 40 * texture(300, 840), np.random.default_rng(3)
+    files = []
+    for number, first in enumerate((0, 220, 440)):
+        seen = ground[:, first : first + 400] + 2 * rng.normal(size=(300, 400))
+        whole = utm_grid(840, 300)
+        grid = whole.window(first + (0, 2, -1)[number], 0, 400, 300)
+        files.append(write_raster(tmp_path / f"d{number}.tif", seen.astype(np.float32), grid))
+    out = tmp_path / "out"
+    series = coregister_series(out, files, reference=files[0], **OPTIONS)
+    rows = {row["name"]: row for row in series.rows()}
+    assert rows["d1"]["file"] and rows["d2"]["state"] == "registered"
+    assert rows["d2"]["file"] is None and "no raster" in rows["d2"]["reason"]
+    assert [path.name for path in out.glob("*.cog.tif")] == ["d1_registered.cog.tif"]
 
 
 def test_the_output_folder_holds_nothing_that_a_virtual_date_is_made_of(tmp_path: Path) -> None:

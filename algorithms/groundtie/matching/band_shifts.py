@@ -1,4 +1,4 @@
-"""Bands of one image that show the ground at other pixels than the next band does.
+"""Bands of one image that show the ground at other pixels than others do.
 
 Parallax between the detectors of a push-broom sensor, or careless stacking, displaces bands. They
 are averaged before they are matched, and registered by one transform. Source: phase correlation
@@ -7,10 +7,8 @@ are averaged before they are matched, and registered by one transform. Source: p
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -36,16 +34,20 @@ _LEAST_PX = 32
 # half a pixel has one peak, too.
 _BLUR_PX = 0.7
 
-# Bands are displaced if they correlate so many times better there than where they are, and by so
-# many robust standard deviations. Measured on the shared images as they are (32, three missions'
-# among them): up to 2.4 times and by up to 7, of a cirrus band, which shows no ground; of the
-# others 1.0 times. Of bands displaced by 6 px and more: from 4.2 times and by 28 on.
-_CLEAR, _LEAST_HEIGHT = 3.0, 14.0
+# Edges of two bands have one shift if they correlate by so many robust standard deviations there;
+# one that moves them, if so many times more than they correlate, or do the opposite, unmoved.
+# Measured on the shared images as they are (32, three missions' among them): up to 2.4 times and
+# by up to 7, of a cirrus band, which shows no ground; of the others 1.0 times. Of bands displaced
+# by 6 px and more: from 4.2 times and by 28 on.
+_LEAST_HEIGHT, _CLEAR = 14.0, 3.0
+
+# So far, unmoved edges correlate.
+_UNMOVED_PX = 1
 
 
 @dataclass(frozen=True)
 class BandShift:
-    """A band that shows the ground elsewhere than the band before it.
+    """Where a band shows the ground, against the first of those that show the same.
 
     Parameters
     ----------
@@ -59,10 +61,20 @@ class BandShift:
     apart_px: float
 
 
-def band_shifts(source: RasterSource) -> Sequence[BandShift]:
-    """Return the bands of an image, but alpha, that clearly are displaced against the one before.
+@dataclass(frozen=True)
+class _Band:
+    """A band: its spectra, and where it shows the ground against the band `first`."""
 
-    By whole images: windows all over it are compared, and their correlations added up.
+    spectra: NDArray[np.complex64]
+    first: int
+    position_px: NDArray[np.float64]
+
+
+def band_shifts(source: RasterSource) -> Sequence[BandShift]:
+    """Return where the bands of an image, but alpha, show the ground that a band before shows.
+
+    By whole images: windows all over it are compared, and their correlations added up. A band
+    that has no edges in common with the last one that had, or with the one before it, is left out.
     """
     bands = source.image_bands
     side = min(_WINDOW_PX, *source.grid.size)
@@ -71,39 +83,39 @@ def band_shifts(source: RasterSource) -> Sequence[BandShift]:
     places = Places.spread(source.grid, side, lambda n: np.clip(n // side, 1, _MOST_ALONG))
     corners = places.centres - side // 2
     windows = [Window(int(col), int(row), side, side) for col, row in corners]
-    spectra = _spectra(source, windows, bands)
+    known = before = _Band(_spectra(source, windows, bands[0]), bands[0], np.zeros(2))
     found = []
-    for one, other in pairwise(range(len(bands))):
-        apart_px = _apart_px(spectra[:, one], spectra[:, other], side)
-        if apart_px is not None:
-            found.append(BandShift((bands[one], bands[other]), apart_px))
+    for number in bands[1:]:
+        band = _Band(_spectra(source, windows, number), number, np.zeros(2))
+        for other in (known, before):
+            shift = _shift_px(other.spectra, band.spectra, side)
+            if shift is not None:
+                band = replace(band, first=other.first, position_px=other.position_px + shift)
+                known = band
+                found.append(BandShift((band.first, number), float(np.hypot(*band.position_px))))
+                break
+        before = band
     return found
 
 
-def _spectra(
-    source: RasterSource, windows: Sequence[Window], bands: Sequence[int]
-) -> NDArray[np.complex64]:
-    """Return the spectra of edges in windows of bands, shape (windows, bands, h, w / 2 + 1)."""
+def _spectra(source: RasterSource, windows: Sequence[Window], band: int) -> NDArray[np.complex64]:
+    """Return the spectra of edges in windows of a band, shape (windows, h, w / 2 + 1)."""
     spectra = []
     for window in windows:
-        values, valid = source.read_bands(window, bands)
-        grey = np.abs(values) if source.is_complex else values
-        patch = Patch(np.where(valid, grey, 0).astype(np.float32), valid)
-        (finest,) = squared_gradients(compress(patch), patch.valid, SCALES_PX[:1])
-        edges = edge_strength(finest, patch.valid)
-        counts = edges.valid.sum(axis=(-2, -1), keepdims=True)
-        sums = np.where(edges.valid, edges.values, 0).sum(axis=(-2, -1), keepdims=True)
-        centred = np.where(edges.valid, edges.values - sums / np.maximum(counts, 1), 0)
+        values, valid = source.read(window, band)
+        (finest,) = squared_gradients(compress(Patch(values, valid)), valid, SCALES_PX[:1])
+        edges = edge_strength(finest, valid)
+        mean = edges.values[edges.valid].mean() if edges.valid.any() else np.float32(0)
         taper = np.outer(np.hanning(window.height), np.hanning(window.width))
-        spectra.append(scipy.fft.rfft2((centred * taper).astype(np.float32)))
+        centred = np.where(edges.valid, edges.values - mean, 0) * taper
+        spectra.append(scipy.fft.rfft2(centred.astype(np.float32)))
     return np.array(spectra)
 
 
-def _apart_px(one: NDArray[np.complex64], other: NDArray[np.complex64], side: int) -> float | None:
-    """Return how far apart two bands are by spectra of windows of a side, (windows, …); None: not.
-
-    Also if nothing is clear.
-    """
+def _shift_px(
+    one: NDArray[np.complex64], other: NDArray[np.complex64], side: int
+) -> NDArray[np.float64] | None:
+    """Return how far bands are apart, (x, y), by spectra of windows of a side; None: unclear."""
     cross = one.conj() * other
     size = np.abs(cross)
     phases = np.divide(cross, size, out=np.zeros_like(cross), where=size > 0).sum(axis=0)
@@ -112,12 +124,17 @@ def _apart_px(one: NDArray[np.complex64], other: NDArray[np.complex64], side: in
     whole = over_shifts[1 - side % 2 :, 1 - side % 2 :]
     surface = normalise(np.asarray(cv2.GaussianBlur(whole, (0, 0), _BLUR_PX), np.float32))
     peak = find_peak(surface)
-    is_clear = peak.height > max(_LEAST_HEIGHT, _CLEAR * _height_unmoved(surface))
-    return math.hypot(*peak.shift_px) if is_clear else None
+    least = _LEAST_HEIGHT
+    if np.hypot(*peak.shift_px) > SAME_PX:
+        least = max(least, _CLEAR * _height_unmoved(surface))
+    return np.array(peak.shift_px) if peak.height > least else None
 
 
 def _height_unmoved(surface: Surface) -> float:
-    """Return the largest value where bands count as not displaced."""
-    middle, reach = surface.shape[0] // 2, int(SAME_PX)
-    near = slice(middle - reach, middle + reach + 1)
-    return float(surface[near, near].max())
+    """Return the largest magnitude where bands count as unmoved.
+
+    It is negative where edges lie beside one another, as those of heights and of their shading.
+    """
+    middle = surface.shape[0] // 2
+    near = slice(middle - _UNMOVED_PX, middle + _UNMOVED_PX + 1)
+    return float(np.abs(surface[near, near]).max())

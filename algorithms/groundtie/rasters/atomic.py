@@ -72,6 +72,12 @@ class Outputs:
         self._staged[final] = staged
         return staged
 
+    def withdraw(self, path: str | os.PathLike[str]) -> None:
+        """Remove what was written of an output, and stage it no longer: the others stand."""
+        staged = self._staged.pop(Path(os.path.abspath(path)))
+        for present in (*_sidecars(staged), staged):
+            remove(present)
+
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:

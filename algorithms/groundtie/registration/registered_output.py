@@ -81,7 +81,7 @@ class RegisteredOutput:
         Raises
         ------
         NoOverlapError
-            No pixel of a raster that is resampled would be valid.
+            No pixel of a raster that is resampled would be valid; nothing of it is kept.
         """
         staged, progress = outputs.stage(self.path), context.progress
         if grid_of_output(self.path, self.grid) == UNTOUCHED:
@@ -96,6 +96,7 @@ class RegisteredOutput:
         if not warp_raster(
             source, to_px, target, staged, method, workers=workers, progress=progress
         ):
+            outputs.withdraw(self.path)
             raise NoOverlapError(
                 f"the registered raster would hold no data: {source.path} has no valid pixels "
                 "where its grid lies, or fewer than make one of its pixels"

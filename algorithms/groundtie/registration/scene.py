@@ -83,7 +83,7 @@ class ImageFacts:
 
     @cached_property
     def band_shifts(self) -> Sequence[BandShift]:
-        """Bands that are displaced against the one before, by how many matching pixels."""
+        """Where bands show the ground against the first of those that show it, in matching px."""
         scale = self.image.source.grid.pixel_size_m / self.scene.grid.pixel_size_m
         found = band_shifts(self.image.source)
         return [replace(one, apart_px=one.apart_px * scale) for one in found]

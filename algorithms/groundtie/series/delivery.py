@@ -12,7 +12,7 @@ import numpy as np
 from shapely.geometry import LineString, mapping
 
 from ..context import Context
-from ..errors import NotRegisteredError
+from ..errors import NoOverlapError, NotRegisteredError
 from ..geometry.vector_layers import write_vector_layer
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import Grid
@@ -90,8 +90,14 @@ class SeriesFiles:
         dates, written, items = [], {}, []
         for number, one in enumerate(series.dates):
             part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
-            if one.is_registered:
-                one, known, grid = self._with_raster(one, series, stored, outputs, part)
+            try:
+                made = self._with_raster(one, series, stored, outputs, part)
+            except NoOverlapError as error:
+                # It lies where the series' map has no pixel of it; the others stand.
+                verdict = replace(one.verdict, reason=f"{one.verdict.reason}; no raster: {error}")
+                one, made = replace(one, verdict=verdict), None
+            if made is not None:
+                one, known, grid = made
                 beyond = series.beyond_overlap(one, self.output_grid)
                 share = None if beyond is None else beyond.share
                 written[one.name] = {**known, "outside_of_overlap": share}
@@ -110,7 +116,10 @@ class SeriesFiles:
         stored: StoredSeries,
         outputs: _PlacedOutputs,
         context: Context,
-    ) -> tuple[SeriesDate, dict[str, Any], Grid]:
+    ) -> tuple[SeriesDate, dict[str, Any], Grid] | None:
+        """Return a date, what is known of its raster, and its grid; None: it is not registered."""
+        if not one.is_registered:
+            return None
         assert one.date is not None and one.transform is not None
         key, before = self.raster_key(one, series), stored.dates.get(one.name)
         if before is not None and before.key == key and before.is_untouched(self.folder):

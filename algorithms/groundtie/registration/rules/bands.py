@@ -26,7 +26,7 @@ BANDS_RULES: tuple[Rule, ...] = (
     Rule(
         "bands apart",
         "a band of the input, or of a reference all of whose bands are matched, shows the ground "
-        "farther from where the band before it does than the largest error",
+        "farther from where the first of them does than the largest error",
         "the user's largest error",
         "register the bands to one another first, or give an image of one band",
         _bands_apart,
