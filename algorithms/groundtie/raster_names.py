@@ -169,8 +169,9 @@ def own_world_files(path: Path) -> list[Path]:
 
     GDAL takes them for its georeferencing if it has none. Of other paths there are none.
     """
-    others = _suffixes_beside(path) - {*_WORLD_ENDINGS, *_WITHOUT_WORLD_FILES}
-    if path.suffix.lower() not in (".tif", ".tiff") or others:
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        return []
+    if _suffixes_beside(path) - {*_WORLD_ENDINGS, *_WITHOUT_WORLD_FILES}:
         return []
     wanted = [path.stem.lower() + ending for ending in _WORLD_ENDINGS]
     found = [path.with_name(name) for name in _names_beside(path) if name.lower() in wanted]

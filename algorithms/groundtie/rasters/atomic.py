@@ -72,6 +72,13 @@ class Outputs:
         self._staged[final] = staged
         return staged
 
+    def staged(self, path: str | os.PathLike[str]) -> Path:
+        """Return where an output that was staged lies until all are complete.
+
+        Renaming it changes neither its size nor its time.
+        """
+        return self._staged[Path(os.path.abspath(path))]
+
     def withdraw(self, path: str | os.PathLike[str]) -> None:
         """Remove what was written of an output, and stage it no longer: the others stand."""
         staged = self._staged.pop(Path(os.path.abspath(path)))

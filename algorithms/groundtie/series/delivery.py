@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,8 +64,7 @@ class SeriesFiles:
             forget_unfinished(self.folder)
             raise _refusal(series)
         make_folder(self.folder)
-        outputs = _PlacedOutputs()
-        with outputs:
+        with Outputs() as outputs:
             series = self._with_rasters(series, stored, outputs, context)
             write_csv(outputs.stage(self.folder / TABLE_CSV), TABLE_COLUMNS, series.rows())
             _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
@@ -84,7 +82,7 @@ class SeriesFiles:
         return digest(facts, __version__)
 
     def _with_rasters(
-        self, series: Series, stored: StoredSeries, outputs: _PlacedOutputs, context: Context
+        self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
     ) -> Series:
         """Write the rasters that are not there yet, and return what the series has then."""
         dates, written, items = [], {}, []
@@ -114,7 +112,7 @@ class SeriesFiles:
         one: SeriesDate,
         series: Series,
         stored: StoredSeries,
-        outputs: _PlacedOutputs,
+        outputs: Outputs,
         context: Context,
     ) -> tuple[SeriesDate, dict[str, Any], Grid] | None:
         """Return a date, what is known of its raster, and its grid; None: it is not registered."""
@@ -135,7 +133,7 @@ class SeriesFiles:
         path = self.folder / f"{one.name}_registered.cog.tif"
         output = RegisteredOutput(path, self.output_grid, self.resampling)
         grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
-        state = state_of(outputs.places[path])
+        state = state_of(outputs.staged(path))
         return one, _known(path.name, key, run_tags().get(RUN), state), grid
 
     def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
@@ -178,23 +176,6 @@ class SeriesFiles:
             for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
                 with writing(self.folder / name):
                     (self.folder / name).unlink(missing_ok=True)
-
-
-class _PlacedOutputs(Outputs):
-    """Outputs of which is known where they lie until they are complete.
-
-    Renaming changes neither size nor time of a file: `series.json` can state those of rasters that
-    get their final names together with it.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.places: dict[Path, Path] = {}
-
-    def stage(self, path: str | os.PathLike[str]) -> Path:
-        """Return the name under which to write an output for now, and keep it."""
-        self.places[Path(path)] = staged = super().stage(path)
-        return staged
 
 
 def _known(file: str, key: str, run: str | None, state: str | None) -> dict[str, Any]:
