@@ -124,7 +124,7 @@ def _write_sensor(folder: Path) -> None:
     one = (1.0, *[0.0] * (TERMS - 1))
     middle = (size - 0.5, size - 0.5)
     sample, line = (tuple(row.tolist()) for row in numerators)
-    rpc = RPC((*_CENTRE, 400.0), scale, middle, (size, size), sample, one, line, one)
+    rpc = RPC((*_CENTRE, 400.0), scale, middle, (size, size), (sample, one, line, one))
     image = np.random.default_rng(2).integers(1, 255, (SIDE, SIDE)).astype(np.uint8)
     _write(folder / "sensor.tif", image, crs=None, transform=None)
     write_rpc(folder / "rpc.txt", rpc)

@@ -107,7 +107,7 @@ def test_a_shift_moves_positions_exactly() -> None:
 @pytest.mark.parametrize(
     "changed",
     [
-        {"line_numerator": (1.0,) * 19},
+        {"polynomials": ((1.0,) * 20, (1.0,) * 20, (1.0,) * 19, (1.0,) * 20)},
         {"scale": (1.0, 0.0, 1.0)},
         {"offset": (float("nan"), 0.0, 0.0)},
     ],

@@ -32,9 +32,7 @@ def write_image(path: Path, rpc: RPC | None = None) -> Path:
 
 def flat(rpc: RPC) -> np.ndarray:
     values = [getattr(rpc, field.name) for field in fields(rpc)]
-    return np.concatenate(
-        [np.atleast_1d(np.array(value, float)) for value in values if value is not None]
-    )
+    return np.concatenate([np.ravel(value).astype(float) for value in values if value is not None])
 
 
 def assert_same(found: RPC, expected: RPC) -> None:

@@ -14,7 +14,7 @@ from ..progress import Progress
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.geoids import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
-from ..sensor.rpc import RPC
+from ..sensor.rpc import RPC, VALID_RANGE
 from ..sensor.rpc_files import rpc_of
 
 # Filled voids of less of an image are not stated: rims are known to reduced pixels.
@@ -69,7 +69,7 @@ class Ground:
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 
     def _require_range(self, rpc: RPC) -> None:
-        low, high = rpc.valid_heights_m
+        low, high = rpc.heights_m(VALID_RANGE)
         if self.height_m is not None and not low <= self.height_m <= high:
             raise ParameterError(
                 f"the RPCs do not hold at a height of {self.height_m:g} m, only from {low:.0f} to "

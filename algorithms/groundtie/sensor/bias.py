@@ -93,7 +93,7 @@ def fold(rpc: RPC, bias: Bias) -> RPCFit:
     """
     if bias.kind == SHIFT:
         return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0)
-    px, height = image_lattice(bias.size, np.linspace(*rpc.height_range_m, HEIGHTS))
+    px, height = image_lattice(bias.size, np.linspace(*rpc.heights_m(), HEIGHTS))
     lon_lat = rpc.localise(px, height)
     seen = np.isfinite(lon_lat).all(axis=1)
     lon_lat, height = lon_lat[seen], height[seen]

@@ -131,7 +131,7 @@ def check_heights(
     constant = isinstance(orientation.heights, ConstantHeight)
     return HeightCheck(
         (low, high),
-        rpc.height_range_m,
+        rpc.heights_m(),
         None if constant else _geoid(seen),
         offset,
         sigma,

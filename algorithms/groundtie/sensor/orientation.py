@@ -22,7 +22,7 @@ from ..rasters.grid import (
 )
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .rpc import RPC, image_lattice
+from .rpc import RPC, VALID_RANGE, image_lattice
 from .smooth_map import smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
@@ -193,7 +193,7 @@ def orient(
         See `terrain_heights`.
     """
     size = source.grid.size
-    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.valid_heights_m])
+    extremes = np.vstack([seen_at(rpc, size, height) for height in rpc.heights_m(VALID_RANGE)])
     heights: Heights
     if dem is None:
         heights = ConstantHeight(rpc.offset[2] if height_m is None else height_m)

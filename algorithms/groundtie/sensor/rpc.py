@@ -7,7 +7,6 @@ first pixel, which lies at 0: they are the (col, row) of arrays.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -42,8 +41,9 @@ class RPC:
         Of longitude (degrees), latitude (degrees) and height (metres above the ellipsoid).
     image_offset, image_scale
         Of column (sample) and row (line), in pixels; the first pixel's centre is at (0, 0).
-    sample_numerator, sample_denominator, line_numerator, line_denominator
-        The twenty coefficients of each polynomial, in the order of RPC00B.
+    polynomials
+        The twenty coefficients, in the order of RPC00B, of numerator and denominator of the sample,
+        and of those of the line.
     error_bias_m, error_random_m
         Root mean square errors that the supplier states, metres; None: not stated.
     """
@@ -52,34 +52,22 @@ class RPC:
     scale: tuple[float, float, float]
     image_offset: tuple[float, float]
     image_scale: tuple[float, float]
-    sample_numerator: tuple[float, ...]
-    sample_denominator: tuple[float, ...]
-    line_numerator: tuple[float, ...]
-    line_denominator: tuple[float, ...]
+    polynomials: tuple[tuple[float, ...], ...]
     error_bias_m: float | None = None
     error_random_m: float | None = None
 
     def __post_init__(self) -> None:
-        if any(len(row) != TERMS for row in self._polynomials):
+        if any(len(row) != TERMS for row in self.polynomials):
             raise ValueError("an RPC polynomial has 20 coefficients")
-        numbers = np.concatenate([self.offset, self.image_offset, *self._polynomials])
+        numbers = np.concatenate([self.offset, self.image_offset, *self.polynomials])
         scales = np.array([*self.scale, *self.image_scale])
         if not np.isfinite(numbers).all() or not np.isfinite(scales).all() or not scales.all():
             raise ValueError("the RPCs hold numbers that are not finite, or scales of 0")
 
-    @property
-    def _polynomials(self) -> Sequence[tuple[float, ...]]:
-        return (
-            self.sample_numerator,
-            self.line_numerator,
-            self.sample_denominator,
-            self.line_denominator,
-        )
-
     @cached_property
     def _coefficients(self) -> FloatArray:
         """Numerators, then denominators, of column and row, shape (4, 20)."""
-        return np.array(self._polynomials)
+        return np.array(self.polynomials)[[0, 2, 1, 3]]
 
     @cached_property
     def _derivatives(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -161,16 +149,12 @@ class RPC:
         in_blocks(work, len(px))
         return found
 
-    @property
-    def height_range_m(self) -> tuple[float, float]:
-        """Lowest and highest height that the coefficients were made for."""
-        reach = abs(self.scale[2])
-        return self.offset[2] - reach, self.offset[2] + reach
+    def heights_m(self, scales: float = 1.0) -> tuple[float, float]:
+        """Return the lowest and highest height within so many scales of the offset.
 
-    @property
-    def valid_heights_m(self) -> tuple[float, float]:
-        """Lowest and highest height at which the coefficients may be used (see `is_valid`)."""
-        reach = VALID_RANGE * abs(self.scale[2])
+        They were made for one; up to `VALID_RANGE` they may be used (see `is_valid`).
+        """
+        reach = scales * abs(self.scale[2])
         return self.offset[2] - reach, self.offset[2] + reach
 
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:

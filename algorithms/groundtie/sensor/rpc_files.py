@@ -18,7 +18,7 @@ from ..errors import GeoreferencingError, OutputError
 from ..rasters.atomic import writing
 from ..rasters.reading import RasterSource
 from .rpc import RPC
-from .rpc_tags import rpc_from_tags, rpc_to_tags
+from .rpc_tags import POLYNOMIALS, rpc_from_tags, rpc_to_tags
 
 Tags = dict[str, str]
 
@@ -243,7 +243,7 @@ def _dimap3_first(root: ElementTree.Element) -> int:
 def _joined(tags: Tags) -> Tags:
     """Join the twenty coefficients of a polynomial, each under a name of its own."""
     joined = {key: value for key, value in tags.items() if "COEFF" not in key}
-    for key in ("LINE_NUM_COEFF", "LINE_DEN_COEFF", "SAMP_NUM_COEFF", "SAMP_DEN_COEFF"):
+    for key in POLYNOMIALS:
         words = [tags[f"{key}_{i}"] for i in range(1, 21) if f"{key}_{i}" in tags]
         if words:
             joined[key] = " ".join(words)

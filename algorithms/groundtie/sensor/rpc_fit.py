@@ -67,16 +67,13 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     terms = np.empty((TERMS, len(ground)))
     fill_terms(((ground - offset) / scale).T, terms)
     target = ((px - image_offset) / image_scale).T
-    (sample_num, sample_den), (line_num, line_den) = (_fit_ratio(terms.T, y) for y in target)
+    sample, line = (_fit_ratio(terms.T, y) for y in target)
     rpc = RPC(
         tuple(offset.tolist()),
         tuple(scale.tolist()),
         tuple(image_offset.tolist()),
         tuple(image_scale.tolist()),
-        sample_num,
-        sample_den,
-        line_num,
-        line_den,
+        (*sample, *line),
         **stated,
     )
     miss = np.hypot(*(rpc.project(ground[:, :2], ground[:, 2]) - px).T)

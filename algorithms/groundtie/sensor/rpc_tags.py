@@ -12,6 +12,9 @@ from ..rasters.grid import MOST_PX
 from .polynomials import TERMS
 from .rpc import RPC
 
+# Names of the coefficients of the polynomials of `RPC`.
+POLYNOMIALS = ("SAMP_NUM_COEFF", "SAMP_DEN_COEFF", "LINE_NUM_COEFF", "LINE_DEN_COEFF")
+
 
 def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
     """Return the RPCs that tags hold.
@@ -42,10 +45,7 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
             (number("LONG_SCALE"), number("LAT_SCALE"), number("HEIGHT_SCALE")),
             (number("SAMP_OFF"), number("LINE_OFF")),
             (number("SAMP_SCALE"), number("LINE_SCALE")),
-            _coefficients(tags, "SAMP_NUM_COEFF"),
-            _coefficients(tags, "SAMP_DEN_COEFF"),
-            _coefficients(tags, "LINE_NUM_COEFF"),
-            _coefficients(tags, "LINE_DEN_COEFF"),
+            tuple(_coefficients(tags, key) for key in POLYNOMIALS),
             error_m("ERR_BIAS"),
             error_m("ERR_RAND"),
         )
@@ -80,18 +80,14 @@ def rpc_to_tags(rpc: RPC) -> dict[str, str]:
     longitude, latitude, height = zip(rpc.offset, rpc.scale, strict=True)
     sample, line = zip(rpc.image_offset, rpc.image_scale, strict=True)
     named = {"LINE": line, "SAMP": sample, "LAT": latitude, "LONG": longitude, "HEIGHT": height}
-    polynomials = {
-        "LINE_NUM_COEFF": rpc.line_numerator,
-        "LINE_DEN_COEFF": rpc.line_denominator,
-        "SAMP_NUM_COEFF": rpc.sample_numerator,
-        "SAMP_DEN_COEFF": rpc.sample_denominator,
-    }
+    polynomials = dict(zip(POLYNOMIALS, rpc.polynomials, strict=True))
+    lines_first = POLYNOMIALS[2:] + POLYNOMIALS[:2]
     errors = {"ERR_BIAS": rpc.error_bias_m, "ERR_RAND": rpc.error_random_m}
     return (
         {name: _text(-1.0 if error is None else error) for name, error in errors.items()}
         | {f"{name}_OFF": _text(offset) for name, (offset, _) in named.items()}
         | {f"{name}_SCALE": _text(scale) for name, (_, scale) in named.items()}
-        | {name: " ".join(map(_text, row)) for name, row in polynomials.items()}
+        | {name: " ".join(map(_text, polynomials[name])) for name in lines_first}
     )
 
 
