@@ -16,6 +16,7 @@ import numpy as np
 import groundtie
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
+from groundtie.kinds import plain
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.specification import Specification
 
@@ -86,20 +87,12 @@ class Outcome:
 
     def record(self) -> dict[str, Any]:
         """Return the outcome as values that JSON can carry."""
-        return for_json(asdict(self))
+        return plain(asdict(self))
 
     def line(self) -> str:
         """Return the outcome as a line of text."""
         error = "" if not self.model else f" {self.error_px:.2f} px ({self.model})"
         return f"{self.name}: {self.verdict}{error} in {self.seconds:.1f} s; {self.reason}"
-
-
-def for_json(values: dict[str, Any]) -> dict[str, Any]:
-    """Return values of which those that JSON has no number for, infinite or unknown, are None."""
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in values.items()
-    }
 
 
 @dataclass(frozen=True)

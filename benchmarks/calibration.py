@@ -13,8 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 
 import groundtie
+from groundtie.kinds import plain
 
-from .attempt import Pair, for_json, on_pixels, tried
+from .attempt import Pair, on_pixels, tried
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .optical_pairs import OpticalPair
 from .real import LARGEST_SHIFT_PX
@@ -88,7 +89,7 @@ class CalibrationRun:
 
     def record(self) -> dict[str, Any]:
         """Return the run as values that JSON can carry."""
-        return for_json(asdict(self))
+        return plain(asdict(self))
 
     def line(self) -> str:
         """Return the run as a line of text."""

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from groundtie.kinds import plain
 from groundtie.masks.used import GROUND
 from groundtie.registration.specification import COREGISTER
 
 from .accuracy import REFUSED, SILENTLY_WRONG, classify
-from .attempt import for_json, on_pixels
+from .attempt import on_pixels
 from .pipeline_runs import found_by
 from .simulations import Simulation
 from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
@@ -56,7 +57,7 @@ class Town:
 
     def record(self) -> dict[str, Any]:
         """Return this as values that JSON can carry."""
-        return for_json(asdict(self))
+        return plain(asdict(self))
 
     def line(self) -> str:
         """Return this as a line of text."""

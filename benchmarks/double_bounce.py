@@ -18,6 +18,7 @@ import numpy as np
 
 from groundtie.context import threads
 from groundtie.geometry.views import View
+from groundtie.kinds import plain
 from groundtie.masks.object_heights import RasterModel
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import DOUBLE_BOUNCE, SurfaceGround, write_image
@@ -30,7 +31,7 @@ from groundtie.registration.specification import BOTH, COREGISTER
 from groundtie.simulation import files
 
 from .accuracy import SILENTLY_WRONG_PX
-from .attempt import for_json, on_pixels
+from .attempt import on_pixels
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 from .towns import rough, seen_by_radar, to_model
 
@@ -63,7 +64,7 @@ class Bounce:
 
     def record(self) -> dict[str, Any]:
         """Return it as values that JSON can carry."""
-        return for_json(asdict(self))
+        return plain(asdict(self))
 
     def line(self) -> str:
         """Return it as a line of text."""

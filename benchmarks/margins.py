@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
+from groundtie.kinds import plain
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
@@ -37,7 +38,7 @@ from groundtie.registration.verdict import refusals
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase
 from .attacks.suite import choose
-from .attempt import for_json, on_pixels
+from .attempt import on_pixels
 from .cases import RealCase, draw_shift, read_cases, search_radius_m, write_case
 from .pipeline_runs import found_by
 from .real import LARGEST_SHIFT_PX
@@ -144,7 +145,7 @@ class Margins:
     def record(self) -> dict[str, Any]:
         """Return what was measured as values that JSON can carry."""
         names = [statistic.name for statistic in STATISTICS]
-        return for_json(
+        return plain(
             {
                 "name": self.name,
                 "error_px": self.error_px,

@@ -15,9 +15,10 @@ import rasterio
 
 import groundtie
 from groundtie.errors import NotRegisteredError
+from groundtie.kinds import plain
 
 from .accuracy import CORRECT, REFUSED, Truth, lattice
-from .attempt import Outcome, Pair, attempt, for_json
+from .attempt import Outcome, Pair, attempt
 from .processes import OUTPUT, measure
 from .series_scenes import SimulatedSeries, pairwise_px, simulate_series, write_moved
 from .suites import Goal, Settings, SuiteResult, Table
@@ -139,7 +140,7 @@ def run(settings: Settings) -> SuiteResult:
     head = ("series", "good", "registered", "silently wrong", "bad", "named", "largest (px)")
     head += ("median (px)", "pairs refused", "loops that close", "median (px)", "largest (px)")
     table = Table("Series", head, [_row(one) for one in runs])
-    records = [for_json(asdict(one)) for one in (*runs, *gridded)]
+    records = [plain(asdict(one)) for one in (*runs, *gridded)]
     return SuiteResult("Series", goals, (table,), records)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from groundtie.context import threads
 from groundtie.geometry.transform import Transform
+from groundtie.kinds import plain
 from groundtie.matching.locked import EXACT_PX, Sensors, find_locked_content
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
@@ -34,7 +35,6 @@ from .attacks.catalogue import LOCKED
 from .attacks.examples import is_example
 from .attacks.pairs import Pair
 from .attacks.suite import sample
-from .attempt import for_json
 from .series_scenes import simulate_series
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
@@ -75,7 +75,7 @@ class Measured:
 
     def record(self) -> dict[str, Any]:
         """Return what was measured as values that JSON can carry."""
-        return {**asdict(self), "sameness": for_json(asdict(self.sameness))}
+        return {**asdict(self), "sameness": plain(asdict(self.sameness))}
 
 
 @dataclass(frozen=True)

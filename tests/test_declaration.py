@@ -16,9 +16,8 @@ from toys import RETURNING_TOY, TOY, returning_toy, toy
 
 from groundtie.declaration import Output, Parameter, tool, tool_of
 from groundtie.errors import MemoryLimitError, OutputError, ParameterError, SameFileError
-from groundtie.kinds import Flag, MaskIn, Number, RasterIn, RasterOut
+from groundtie.kinds import Flag, MaskIn, Number, RasterIn, RasterOut, plain
 from groundtie.progress import SILENT, Progress
-from groundtie.report.page import plain
 
 
 @pytest.fixture

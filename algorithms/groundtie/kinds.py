@@ -343,3 +343,18 @@ def shown_name(value: Any) -> Any:
     """Return a checked value as reports show it: rasters in memory by what they are called."""
     in_memory = not isinstance(value, (str, os.PathLike)) and hasattr(value, "crs")
     return value.name if in_memory else value
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON can carry it: what is not finite is None, what is no value text."""
+    import numpy as np  # not loaded for the command line's help
+
+    if isinstance(value, dict):
+        return {str(name): plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(part) for part in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(shown_name(value))

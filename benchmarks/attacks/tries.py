@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from groundtie.errors import GroundTieError, NotRegisteredError
+from groundtie.kinds import plain
 
 from ..accuracy import CRASHED, REFUSED
-from ..attempt import for_json
 
 ACCEPTED = "accepted"
 
@@ -61,7 +61,7 @@ class AttackOutcome:
 
     def record(self) -> dict[str, Any]:
         """Return the outcome as values that JSON can carry."""
-        return for_json(asdict(self))
+        return plain(asdict(self))
 
     def line(self) -> str:
         """Return the outcome as a line of text."""

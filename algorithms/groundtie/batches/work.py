@@ -14,8 +14,8 @@ from typing import Any
 from ..declaration import Tool
 from ..errors import CancelledError, GroundTieError, NotRegisteredError
 from ..executors import enter_worker, stop_requested
+from ..kinds import plain
 from ..progress import Progress
-from ..report.page import plain
 from ..runs import file_state, running
 from ..version import __version__
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
+from ..kinds import plain
 from ..rasters.grid import mesh
 from .models import TERRAIN, FloatArray, Frame, Model, PolynomialModel
 from .terrain import Terrain
@@ -100,10 +101,7 @@ class TerrainModel(Model):
             **super().to_json(),
             "origin_m": self.origin_m,
             **self.terrain.to_json(),
-            "heights_m": [
-                [float(height) if np.isfinite(height) else None for height in place]
-                for place in self._compared_m().tolist()
-            ],
+            "heights_m": plain(self._compared_m()),
         }
 
     @classmethod

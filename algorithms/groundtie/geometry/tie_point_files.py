@@ -15,6 +15,7 @@ from rasterio.crs import CRS
 from rasterio.errors import CRSError
 
 from ..errors import OutputError, TransformFileError
+from ..kinds import plain
 from ..rasters.atomic import write_csv, write_json, writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject, require_map
 from ..runs import run_tags
@@ -168,7 +169,7 @@ def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict
         {
             "type": "Feature",
             "geometry": {"type": "LineString", "coordinates": line},
-            "properties": {name: _or_null(value) for name, value in row.items()},
+            "properties": plain(row),
         }
         for line, row in zip(lines.tolist(), rows, strict=True)
     ]
@@ -260,7 +261,3 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     missing = [row for row, known in zip(rows, np.isfinite(px).all(1), strict=True) if not known]
     px[~np.isfinite(px).all(1)] = positions(missing, *PIXEL)
     return px
-
-
-def _or_null(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value

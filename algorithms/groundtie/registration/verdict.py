@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import GroundTieError
 from ..geometry.accuracy import UNKNOWN, Accuracy
+from ..kinds import plain
 from .evidence import AGREEMENT, Evidence, EvidenceOfPoints, SearchEvidence
 from .rules import RULES, Rule
 
@@ -100,8 +101,7 @@ class Verdict:
         values |= {"ce90_low_px": low, "ce90_high_px": high}
         values |= {f"ellipse_{name}": value for name, value in ellipse.items()}
         del values["ce90_px"], values["is_final"]
-        unknown = {k for k, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
-        return {k: None if k in unknown else v for k, v in values.items()}
+        return dict(plain(values))
 
 
 def both_units(px: float, metres: float) -> str:

@@ -18,7 +18,7 @@ import scipy
 
 from ..call_paths import check_numbers
 from ..geometry.judging import TOLERANCE_PX
-from ..kinds import REPORT_FORMAT, shown_name
+from ..kinds import REPORT_FORMAT, plain
 from ..rasters.atomic import Outputs, write_json, writing
 from ..runs import RUN, run_tags
 from ..version import __version__
@@ -57,8 +57,7 @@ class Page:
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers as values that strict JSON can carry."""
-        found: dict[str, Any] = plain(self.numbers() | made(self.parameters, self.seconds))
-        return found
+        return dict(plain(self.numbers() | made(self.parameters, self.seconds)))
 
     def write(
         self,
@@ -106,19 +105,6 @@ def versions() -> dict[str, str]:
         "rasterio": rasterio.__version__,
         "gdal": rasterio.__gdal_version__,
     }
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON can carry it: what is not finite is None, what is no value text."""
-    if isinstance(value, dict):
-        return {str(name): plain(part) for name, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(part) for part in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, (bool, int, str)) else str(shown_name(value))
 
 
 @cache
