@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..geometry.chance import log10_least_false_alarms
 from ..geometry.judging import TOLERANCE_PX, USUAL_MAX_ERROR_PX, sigma_range_px
 from ..geometry.robust import fit_mixture
+from ..geometry.rows import Rows
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..matching.check import CHECK_RADIUS_PX
@@ -24,8 +24,8 @@ WINDOW_PX = 2.0 * CHECK_RADIUS_PX + 1
 
 
 @dataclass(frozen=True)
-class PointErrors:
-    """By how much a transform misses points.
+class PointErrors(Rows):
+    """By how much a transform misses points, one row a point.
 
     Parameters
     ----------
@@ -82,17 +82,6 @@ class PointErrors:
     def none(cls) -> PointErrors:
         """Return the errors at no points."""
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0, bool))
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[PointErrors]) -> PointErrors:
-        """Return the errors in pixels of all parts, one after the other."""
-        names = ("position_px", "error_px", "is_check", "counted")
-        columns = ([getattr(part, name) for part in parts] for name in names)
-        position_px, error_px, is_check, counted = map(np.concatenate, columns)
-        return cls(position_px, error_px, is_check, counted)
-
-    def __len__(self) -> int:
-        return len(self.position_px)
 
     @property
     def placed(self) -> Mask:

@@ -76,7 +76,8 @@ class AssessmentReport(Page):
             measured.check_points,
         )
         # An outlier is shown: as a check point that disagrees.
-        errors = PointErrors.concatenate([replace(part, counted=part.placed) for part in parts])
+        shown = [replace(part, counted=part.placed, error_m=None) for part in parts]
+        errors = PointErrors.concatenate(shown)
         if not errors.used.any():
             return None
         grid = self.transform.input_grid

@@ -15,6 +15,7 @@ from ..geometry.model_choice import (
     left_out_blocks,
 )
 from ..geometry.robust import CONSENSUS_PX, densities, find_consensus, fit_mixture
+from ..geometry.rows import Rows
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray
 from .bias import KINDS, SHIFT, TERMS, Bias, design
@@ -36,8 +37,8 @@ _LARGEST_SIGMA_PX = 1.0
 
 
 @dataclass(frozen=True)
-class Control:
-    """Ground control as seen by RPCs.
+class Control(Rows):
+    """Ground control as seen by RPCs, one row a point.
 
     Parameters
     ----------
@@ -55,15 +56,6 @@ class Control:
     found_px: FloatArray
     covariance_px2: FloatArray
     size: tuple[int, int]
-
-    def __len__(self) -> int:
-        return len(self.expected_px)
-
-    def take(self, which: NDArray[np.bool_]) -> Control:
-        """Return some of the points."""
-        return Control(
-            self.expected_px[which], self.found_px[which], self.covariance_px2[which], self.size
-        )
 
     def residuals_px(self, bias: Bias | None) -> FloatArray:
         """Return found minus corrected positions, shape (n, 2); without a bias as delivered."""
