@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import GeoreferencingError
+from ..geometry.judging import SMALLEST_PX
 from ..rasters.atomic import write_csv, writing
 from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, near_longitude, reproject
-from ..report.figures import CHECK_COLOUR, FIT_COLOUR, SMALLEST_PX, round_length
+from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
 from ..sensor.rpc import RPC
 from .statistics import Statistics

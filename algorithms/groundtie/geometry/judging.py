@@ -36,7 +36,7 @@ USUAL_MAX_ERROR_PX = 3.0
 CE90_FACTOR = math.sqrt(-2 * math.log(0.1))
 
 # Below a hundredth of a pixel nothing is measured.
-_SMALLEST_SIGMA_PX = 0.01
+SMALLEST_PX = 0.01
 _SIGMA_BEYOND = 1.5
 
 
@@ -47,4 +47,9 @@ def sigma_range_px(max_error_px: float) -> tuple[float, float]:
     seen; and no less than usual, as how large errors are does not depend on what is asked for.
     """
     largest = _SIGMA_BEYOND * max(max_error_px, USUAL_MAX_ERROR_PX) / math.sqrt(2)
-    return _SMALLEST_SIGMA_PX, largest
+    return SMALLEST_PX, largest
+
+
+def ce90_of_rmse(rmse_px: float) -> float:
+    """Return the radius that holds 90 % of circular normal errors of a root mean square."""
+    return rmse_px / math.sqrt(2) * CE90_FACTOR

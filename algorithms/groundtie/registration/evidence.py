@@ -21,7 +21,7 @@ from ..geometry.accuracy import (
     standard_deviation_px,
 )
 from ..geometry.estimation import Estimate, jackknife_spread
-from ..geometry.judging import CE90_FACTOR, LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE
+from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE, ce90_of_rmse
 from ..geometry.misses import Misses
 from ..geometry.tie_points import TiePoints
 from ..masks.used import MaskUsed
@@ -178,7 +178,7 @@ class Agreement:
     @property
     def largest_ce90_px(self) -> float:
         """Largest radius of 90 % that is accepted: that of errors as large as the largest."""
-        return self.max_error_px / math.sqrt(2) * CE90_FACTOR
+        return ce90_of_rmse(self.max_error_px)
 
 
 class EvidenceOfPoints(Evidence, Protocol):

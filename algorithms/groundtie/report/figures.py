@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..assessment.point_errors import PointErrors
-from ..geometry.judging import CE90_FACTOR, FEWEST_CHECK_POINTS, TOLERANCE_PX
+from ..geometry.judging import FEWEST_CHECK_POINTS, SMALLEST_PX, TOLERANCE_PX, ce90_of_rmse
 from ..rasters.grid import FloatArray, Grid
 from ..registration.verdict import Verdict
 from .pictures import data_uri
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
-
-# The typical residual is no smaller than this.
-SMALLEST_PX = 0.01
 
 _ROUND_NUMBERS = (1.0, 2.0, 5.0)
 
@@ -82,15 +79,10 @@ def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
 
     As far as needed to see the errors of inliers; without such, to the largest error.
     """
-    radius = ninety_percent_px(verdict)
+    radius = ce90_of_rmse(verdict.check_rmse_px)
     if math.isfinite(radius):
         return max(1.6 * radius, 1.5 * TOLERANCE_PX)
     return float(max(errors.length_px[errors.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
-
-
-def ninety_percent_px(verdict: Verdict) -> float:
-    """Return the radius within which 90 % of the residuals of inliers lie, by their RMSE."""
-    return verdict.check_rmse_px / math.sqrt(2) * CE90_FACTOR
 
 
 def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
@@ -163,7 +155,7 @@ def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float 
         at = np.linspace(0, reach, 100)
         expected = rayleigh_counts(at, float(edges[1]), verdict)
         axes.plot(at, expected, color="black", lw=1.5, label="Rayleigh curve of the RMSE")
-        radius = ninety_percent_px(verdict)
+        radius = ce90_of_rmse(verdict.check_rmse_px)
         axes.axvline(radius, color=FIT_COLOUR, ls="--", lw=1.5, label="90 % of the residuals")
         axes.set_ylim(top=1.35 * axes.get_ylim()[1])
         axes.legend(edgecolor="white", framealpha=1, fontsize=8, loc="upper right")
@@ -187,7 +179,7 @@ def error_scatter(errors: PointErrors, verdict: Verdict) -> Figure:
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.axvline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.plot(*errors.error_px[shown].T, "o", color=CHECK_COLOUR, alpha=0.75, ms=5, mew=0)
-    radius = ninety_percent_px(verdict)
+    radius = ce90_of_rmse(verdict.check_rmse_px)
     if math.isfinite(radius):
         circle = Circle((0, 0), radius, fill=False, ec=FIT_COLOUR, ls="--", lw=1.5)
         axes.add_patch(circle)
