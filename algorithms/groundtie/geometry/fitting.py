@@ -22,7 +22,7 @@ from .models import (
 TPS_STIFFNESS = 1e-2
 
 # Singular values below this share of the largest are rounding errors.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 
 
 def fit_model(
@@ -95,7 +95,7 @@ def _fit_thin_plate(
     count = len(uv)
     affine_part = monomials(uv, 1)
     sizes = np.linalg.svd(affine_part, compute_uv=False)
-    if sizes[-1] <= _ROUNDING * sizes[0]:
+    if sizes[-1] <= ROUNDING * sizes[0]:
         raise TooFewPointsError("the tps model needs points that do not all lie on a line")
     stiffness = TPS_STIFFNESS * weights.mean() / weights
     system = np.zeros((count + 3, count + 3))

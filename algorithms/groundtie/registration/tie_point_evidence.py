@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
 from ..geometry.chance import log10_least_false_alarms
-from ..geometry.fitting import fit_model
+from ..geometry.fitting import ROUNDING, fit_model
 from ..geometry.models import DEGREE, Frame, fewest_points, monomials
 from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
 from .evidence import TIE_POINTS
-
-# Singular values below this share of the largest are rounding errors.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -150,7 +147,7 @@ class TiePointEvidence:
         else:
             design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))
         _, sizes, axes = np.linalg.svd(design, full_matrices=False)
-        if sizes[-1] <= _ROUNDING * sizes[0]:
+        if sizes[-1] <= ROUNDING * sizes[0]:
             return math.inf
         leverage = (np.abs(at @ axes.conj().T / sizes) ** 2).sum(axis=1)
         return float(np.sqrt(leverage.max()))
