@@ -51,26 +51,19 @@ class Arrows:
 
 
 def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
-    """Exaggerate residuals by a round factor so that the typical one is well visible."""
-    side = max(grid.size)
+    """Exaggerate residuals so that the typical one is well visible."""
     # A flexible model leaves next to nothing at the points of its own fit.
     enough = errors.agreeing.sum() >= FEWEST_CHECK_POINTS
     which = errors.agreeing if enough else errors.used
-    factor = 1.0
-    if which.any():
-        typical = max(float(np.median(errors.length_px[which])), SMALLEST_PX)
-        factor = max(round_length(0.04 * side / typical), 1.0)
-    return _arrows(errors.error_px, factor, side)
+    # Where there is none, as if all were as long as the grid: nothing is exaggerated.
+    typical_px = float(np.median(errors.length_px[which])) if which.any() else max(grid.size)
+    return scaled_arrows(errors.error_px, typical_px, 0.04, grid)
 
 
-def scaled_arrows(by_px: FloatArray, longest_px: float, grid: Grid) -> Arrows:
-    """Exaggerate by a round factor so that what is long is no more than a tenth of the grid."""
+def scaled_arrows(by_px: FloatArray, length_px: float, share: float, grid: Grid) -> Arrows:
+    """Exaggerate by a round factor so that a length is no more than a share of the grid's side."""
     side = max(grid.size)
-    factor = max(round_length(0.1 * side / max(longest_px, SMALLEST_PX)), 1.0)
-    return _arrows(by_px, factor, side)
-
-
-def _arrows(by_px: FloatArray, factor: float, side: int) -> Arrows:
+    factor = max(round_length(share * side / max(length_px, SMALLEST_PX)), 1.0)
     return Arrows(by_px * factor, factor, round_length(0.12 * side / factor))
 
 

@@ -61,7 +61,7 @@ def parts_map(survey: Survey) -> Figure:
         other[list(part.members)] = False
     px = survey.centres.astype(float)
     farthest_px = max(part.distance_px for part in parts)
-    arrows = figures.scaled_arrows(survey.shifts_px, farthest_px, grid)
+    arrows = figures.scaled_arrows(survey.shifts_px, farthest_px, 0.1, grid)
     axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
     axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
     for k, part in enumerate(parts):
