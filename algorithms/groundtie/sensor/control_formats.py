@@ -48,7 +48,7 @@ def read_others(path: Path, image: str) -> TiePoints | None:
     TransformFileError
         The file cannot be read or understood.
     """
-    read = _reader(path)
+    read = _READERS.get(path.suffix.lower())
     if read is None:
         return None
     try:
@@ -67,15 +67,6 @@ def read_others(path: Path, image: str) -> TiePoints | None:
         OverflowError,
     ) as error:
         raise TransformFileError(f"cannot read the ground control {path}: {error}") from error
-
-
-def _reader(path: Path) -> Callable[[Path, str], TiePoints | None] | None:
-    suffix = path.suffix.lower()
-    if suffix in (".geojson", ".json"):
-        return _read_orthority
-    if suffix == ENVI:
-        return _read_envi
-    return _read_gdal if suffix in RASTERS else None
 
 
 def _points(xy: FloatArray, px: FloatArray, height_m: FloatArray, crs: CRS) -> TiePoints:
@@ -147,3 +138,11 @@ def _envi_crs(comments: str) -> CRS:
     if "wgs-84" in words and words[0].startswith("geographic"):
         return LON_LAT
     raise ValueError("its projection info is none of UTM or Geographic Lat/Lon on WGS-84")
+
+
+_READERS: dict[str, Callable[[Path, str], TiePoints | None]] = {
+    ".geojson": _read_orthority,
+    ".json": _read_orthority,
+    ENVI: _read_envi,
+    **dict.fromkeys(RASTERS, _read_gdal),
+}
