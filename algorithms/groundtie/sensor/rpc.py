@@ -85,8 +85,7 @@ class RPC:
         height_m
             Height above the ellipsoid, shape (n,) or one for all.
         """
-        lon_lat = np.asarray(lon_lat, float)
-        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        lon_lat, height = _at_heights(lon_lat, height_m)
         px = np.empty((len(lon_lat), 2))
 
         def work(part: slice, terms: FloatArray) -> None:
@@ -106,8 +105,7 @@ class RPC:
         Rows are column and row, columns longitude and latitude (px per degree) and height (px per
         metre). Parameters as `project`.
         """
-        lon_lat = np.asarray(lon_lat, float)
-        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        lon_lat, height = _at_heights(lon_lat, height_m)
         slopes = np.empty((len(lon_lat), 2, 3))
 
         def work(part: slice, terms: FloatArray) -> None:
@@ -132,8 +130,7 @@ class RPC:
         height_m
             As `project` has it.
         """
-        px = np.asarray(px, float)
-        height = np.broadcast_to(np.asarray(height_m, float), len(px))
+        px, height = _at_heights(px, height_m)
         found = np.empty((len(px), 2))
         start = self._start
 
@@ -163,8 +160,7 @@ class RPC:
         That is within 1.5 times the scales around the offsets: farther off, the polynomials may
         lead positions of other places back into the image. Parameters as `project`.
         """
-        lon_lat = np.asarray(lon_lat, float)
-        height = np.broadcast_to(np.asarray(height_m, float), len(lon_lat))
+        lon_lat, height = _at_heights(lon_lat, height_m)
         inside = np.abs(self._normalised(lon_lat, height)) <= VALID_RANGE
         return np.asarray(inside.all(axis=0))
 
@@ -268,6 +264,12 @@ class _Start:
         """Return normalised longitude and latitude, (2, n), near those of image positions."""
         fill_terms(np.vstack([_unit(target, self.low, self.span), height]), terms)
         return self.coefficients @ terms
+
+
+def _at_heights(positions: ArrayLike, height_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return positions, (n, 2), and a height for each, (n,): its own, or the one of all."""
+    places = np.asarray(positions, float)
+    return places, np.broadcast_to(np.asarray(height_m, float), len(places))
 
 
 def _lattice_terms() -> tuple[FloatArray, FloatArray]:
