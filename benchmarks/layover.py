@@ -25,13 +25,11 @@ from groundtie.masks.shadow_direction import shadow_azimuth_deg
 from groundtie.matching.matcher import Places
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.rasters.grid import Grid
-from groundtie.rasters.pair import Image, make_pair
-from groundtie.rasters.reading import open_raster
 from groundtie.simulation.optical import OpticalOptions
 
 from .attempt import Pair
 from .city import city
-from .masks import masked_by
+from .masks import masked_by, opened
 from .simulations import Simulation
 from .suites import Settings, SuiteResult, Table, run_cases
 
@@ -131,10 +129,7 @@ def of_ground(seed: int, pair: Pair) -> tuple[list[Drawn], Directions]:
     found = []
     with ExitStack() as stack:
         context = stack.enter_context(threads(1))
-        images = make_pair(
-            Image(stack.enter_context(open_raster(pair.reference))),
-            Image(stack.enter_context(open_raster(pair.input))),
-        )
+        images = opened(pair, stack)
         scene = Scene.of(images.reference.source)
         camera = Scene.of(images.input.source)
         azimuths = [shadow_azimuth_deg(one.read(one.whole), *_SHADOWS) for one in (scene, camera)]

@@ -25,6 +25,7 @@ from groundtie.registration.user_masks import drawn_mask
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings, describe, similarity_surface
 
+from .attempt import Pair
 from .city import city
 from .suites import Goal, Settings, SuiteResult, Table
 
@@ -103,10 +104,7 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
     truth = load_transform(pair.reference.parent / "truth.json")
     found = []
     with ExitStack() as stack:
-        images = make_pair(
-            Image(stack.enter_context(open_raster(pair.reference))),
-            Image(stack.enter_context(open_raster(pair.input))),
-        )
+        images = opened(pair, stack)
         scene = Scene.of(images.reference.source)
         input = images.input_patch(images.reference.source.grid, truth)
         for name, mask in MASKS.items():
@@ -118,6 +116,12 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
                 surface = similarity_surface(there.inner(RADIUS_PX), here, RADIUS_PX, how)
                 found.append(Found(seed, name, similarity, *find_peak(surface).shift_px))
     return found
+
+
+def opened(pair: Pair, stack: ExitStack) -> ImagePair:
+    """Return the images of a pair, open as long as a stack."""
+    paths = pair.reference, pair.input
+    return make_pair(*(Image(stack.enter_context(open_raster(path))) for path in paths))
 
 
 def masked_by(images: ImagePair, scene: Scene, select: Select, stack: ExitStack) -> ImagePair:

@@ -47,16 +47,20 @@ def each_band(change: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Effec
     return Effect(lambda image: np.maximum(np.stack([change(band) for band in image]), 1))
 
 
-@effect("JPEG blocks")
-def jpeg(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Compress strongly, on the same lattice of 8 by 8 pixels."""
-    quality = int(rng.integers(3, 18))
+def compressed(quality: int) -> Effect:
+    """Return the effect of JPEG at a quality."""
 
     def compress(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
         _, code = cv2.imencode(".jpg", band, [cv2.IMWRITE_JPEG_QUALITY, quality])
         return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
 
     return each_band(compress)
+
+
+@effect("JPEG blocks")
+def jpeg(shape: Shape, rng: np.random.Generator) -> Effect:
+    """Compress strongly, on the same lattice of 8 by 8 pixels."""
+    return compressed(int(rng.integers(3, 18)))
 
 
 @effect("nearest-neighbour upsampling")

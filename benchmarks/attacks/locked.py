@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from groundtie.rasters.grid import compose
 
 from . import cartography, effects
 from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction, resampled
 from .overlays import OVERLAYS, Draw
-from .pairs import Change, Pair
+from .pairs import Pair
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
@@ -116,17 +114,10 @@ def restyled(draw: Draw) -> Make:
         other = replace(drawn, values=np.clip(rng.choice([0, 255]) - drawn.values, 0, 255))
         other = replace(other, alpha=drawn.alpha * rng.uniform(0.6, 1.0))
         made = moved.changed(drawn.change(), other.change(), "other colours, compressed")
-        return made.changed(*(_compressed(int(rng.integers(30, 85))) for _ in range(2)))
+        qualities = (int(rng.integers(30, 85)) for _ in range(2))
+        return made.changed(*(effects.compressed(each).change() for each in qualities))
 
     return make
-
-
-def _compressed(quality: int) -> Change:
-    def compress(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        _, code = cv2.imencode(".jpg", band, [cv2.IMWRITE_JPEG_QUALITY, quality])
-        return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
-
-    return effects.each_band(compress).change()
 
 
 def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
