@@ -14,8 +14,7 @@ from rpc_scenes import SIZE, make_scene
 
 from groundtie.errors import NothingFoundError, TooFewPointsError
 from groundtie.geometry.models import KINDS, shift_model
-from groundtie.geometry.tie_point_files import EDITED
-from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.tie_points import EDITED, TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import Grid
 from groundtie.review import (
@@ -82,8 +81,8 @@ def test_a_point_moved_by_50_m_changes_its_residual_and_the_fit() -> None:
     assert after.residuals_px[3] > 4
     assert rmse_px(moved, "affine") > 10 * rmse_px(review, "affine")
     assert moved.worst(after.residuals_px)[0] == 3
-    assert moved.edited.tolist() == [index == 3 for index in range(40)]
-    assert not review.edited.any()  # what was there before is as it was
+    assert moved.points.edited.tolist() == [index == 3 for index in range(40)]
+    assert not review.points.edited.any()  # what was there before is as it was
     elsewhere = review.move(3, input_px=review.points.input_px[3] + [5.0, 0.0]).fit("affine")
     assert elsewhere.residuals_px[3] > 4
 
@@ -127,7 +126,7 @@ def test_points_of_a_person_are_marked_in_the_file_and_by_warp(tmp_path: Path) -
     fit = review.fit("translation")
     review.write(tmp_path / "p.gpkg", fit.transform)
     again = Review.open(tmp_path / "p.gpkg", tmp_path / "input.tif")
-    assert again.edited.all()
+    assert again.points.edited.all()
     np.testing.assert_allclose(again.points.input_px, seen, atol=1e-6)
     result = warp(
         tmp_path / "input.tif", tmp_path / "o.tif", tmp_path / "p.gpkg", model="translation"
@@ -292,4 +291,4 @@ def test_control_of_an_image_with_rpcs_is_reviewed_alike(tmp_path: Path) -> None
     again = of_sensor_image(
         *files, tmp_path / "refined_RPC.TXT", *terrain, tmp_path / "residuals.gpkg"
     )
-    assert np.flatnonzero(again.edited).tolist() == [3]
+    assert np.flatnonzero(again.points.edited).tolist() == [3]

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import NothingFoundError, TooFewPointsError
 from .geometry.model_choice import left_out_blocks
 from .geometry.models import KINDS, fewest_points
-from .geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
-from .geometry.tie_points import USED, TiePoints
+from .geometry.tie_point_files import read_tie_points, write_tie_points
+from .geometry.tie_points import EDITED, USED, TiePoints
 from .geometry.transform import Transform
 from .progress import SILENT
 from .rasters.atomic import Outputs
@@ -98,14 +98,9 @@ class Review:
             return cls(read_tie_points(path, source.grid), source.grid)
 
     @property
-    def edited(self) -> NDArray[np.bool_]:
-        """Which points a person moved or added, shape (n,)."""
-        return np.asarray(self.points.more.get(EDITED, np.zeros(len(self.points))) > 0)
-
-    @property
     def _columns(self) -> dict[str, FloatArray]:
         """The points' further columns, with a new one of what was edited."""
-        return {**self.points.more, EDITED: self.edited.astype(float)}
+        return {**self.points.more, EDITED: self.points.edited.astype(float)}
 
     @property
     def nominal(self) -> Transform:

@@ -37,7 +37,7 @@ def model_text(kind: str, fit: Any) -> str:
 def points_text(review: Any, fit: Any) -> str:
     """Return how many points take part, and how many check points agree with a fitted model."""
     points = review.points
-    edited = int(review.edited.sum())
+    edited = int(review.points.edited.sum())
     used = tr("{used} of {all} points take part")
     parts = [used.format(used=int(points.used.sum()), all=len(points))]
     parts += [tr("{} set by hand").format(edited)] if edited else []

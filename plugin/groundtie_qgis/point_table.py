@@ -81,7 +81,7 @@ class PointTable(QAbstractTableModel):
             return np.arange(len(points))
         if self._sorted_by in (_RESIDUAL, _SCORE):
             return self._residuals if self._sorted_by == _RESIDUAL else points.score
-        flags = {_USE: points.used, _ROLE: points.is_check, _EDITED: self._review.edited}
+        flags = {_USE: points.used, _ROLE: points.is_check, _EDITED: points.edited}
         return np.asarray(flags[self._sorted_by], int)
 
     def point_at(self, row: int) -> int:
@@ -137,7 +137,7 @@ class PointTable(QAbstractTableModel):
             return float(values[row]) if row < len(values) else float("nan")
         if column == _ROLE:
             return tr(ROLES[int(points.is_check[row])])
-        return "✎" if self._review.edited[row] else ""
+        return "✎" if self._review.points.edited[row] else ""
 
     def setData(self, index: QModelIndex, value: Any, role: int = 0) -> bool:
         if role != Qt.ItemDataRole.CheckStateRole or index.column() != _USE:

@@ -15,8 +15,8 @@ from rasterio.crs import CRS
 
 from groundtie.errors import TransformFileError
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
-from groundtie.geometry.tie_points import TiePoints
+from groundtie.geometry.tie_point_files import read_tie_points, write_tie_points
+from groundtie.geometry.tie_points import EDITED, TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 

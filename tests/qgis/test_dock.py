@@ -384,7 +384,7 @@ def test_an_image_with_rpcs_from_start_to_points_set_by_hand(
     repair.drag.click()
     place = repair.points.toCanvasCoordinates(repair.points.rows[index][1])
     drag(repair._drag, place, (25, 0))
-    assert repair.review.edited[index]
+    assert repair.review.points.edited[index]
     assert repair.fits["translation"].residuals_px[index] > 2
     repair.write.click()
     desktop.wait(lambda: repair.writer.run is None)

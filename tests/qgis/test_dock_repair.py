@@ -44,7 +44,7 @@ def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path:
     after = repair.fits["affine"]
     assert after.residuals_px[index] > before.residuals_px[index] + 5
     assert after.left_out_px > before.left_out_px
-    assert repair.review.edited[index]
+    assert repair.review.points.edited[index]
     assert "1 set by hand" in repair.text.text()
     assert "9 of 9 check points agree within 2 px" in repair.text.text()
     desktop.picture("5_dragged")
@@ -117,7 +117,7 @@ def test_two_thousand_points_answer_a_drag_within_a_fifth_of_a_second(
         drag(repair._drag, start, (9, 5))
         QgsApplication.processEvents()
         seconds.append(time.process_time() - began)
-    assert repair.review.edited.sum() == 3
+    assert repair.review.points.edited.sum() == 3
     assert min(seconds) < 0.2, seconds
 
 
@@ -134,7 +134,7 @@ def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) 
     # Where the input's georeferencing has the place, and 3 px off.
     repair._clicked_on_map(QgsPointXY(place.x() + SHIFT[0] + 3, place.y() + SHIFT[1] - 2))
     assert len(repair.review.points) == count + 1
-    assert repair.review.edited[-1]
+    assert repair.review.points.edited[-1]
     assert repair.review.points.score[-1] > 5
     expected = repair.review.input_px((place.x() + SHIFT[0], place.y() + SHIFT[1]))
     np.testing.assert_allclose(repair.review.points.input_px[-1], expected, atol=0.5)

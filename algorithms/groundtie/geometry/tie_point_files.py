@@ -37,14 +37,13 @@ from .point_tables import (
     table_rows,
 )
 from .tie_point_frames import NUMBERS, TEXTS, tie_point_columns
-from .tie_points import USED, TiePoints
+from .tie_points import EDITED, USED, TiePoints
 from .transform import Transform
 from .vector_layers import read_vector_layer, write_vector_layer
 
 _LOG = logging.getLogger(__name__)
 SUFFIXES = (".gpkg", ".geojson", ".csv", GEOREFERENCER)
 _LAYER = "tie_points"
-EDITED = "edited"
 _TEXTS = (*TEXTS, "reference_crs")
 _ROLES = ("fit", "check", "")
 

@@ -15,6 +15,10 @@ from .rows import Rows
 from .transform import Transform
 
 USED = "used"
+
+# The further column that is 1 for points that a person moved or drew.
+EDITED = "edited"
+
 NONE_HELD_OUT = (
     "no points took no part in the fit: give check points, or tie points with the role check"
 )
@@ -81,6 +85,11 @@ class TiePoints(Rows):
         Those of the role check; all that are used, if roles are not stated.
         """
         return self.check if self.states_fit or self.check.any() else self.used
+
+    @property
+    def edited(self) -> NDArray[np.bool_]:
+        """Which points a person moved, added or drew, shape (n,)."""
+        return np.asarray(self.more.get(EDITED, np.zeros(len(self))) > 0)
 
     def nominal_xy(self, transform: Transform) -> FloatArray:
         """Return the nominal positions on the reference map, shape (n, 2), by a transform's input.

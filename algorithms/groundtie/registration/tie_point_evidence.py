@@ -15,7 +15,6 @@ from ..errors import TooFewPointsError
 from ..geometry.chance import log10_least_false_alarms
 from ..geometry.fitting import ROUNDING, fit_model
 from ..geometry.models import DEGREE, Frame, fewest_points, monomials
-from ..geometry.tie_point_files import EDITED
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
@@ -186,7 +185,7 @@ class TiePointEvidence:
             check_rmse_px=float(np.sqrt(squared[check].mean())) if check.any() else None,
             border_spread_px=self.border_spread_px,
             log10_chance=self.log10_chance,
-            edited=int(np.sum(self.points.more.get(EDITED, 0.0))),
+            edited=int(self.points.edited.sum()),
         )
 
     @cached_property

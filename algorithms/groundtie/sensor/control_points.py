@@ -15,9 +15,9 @@ from ..errors import TransformFileError
 from ..geometry.georeferencer import SUFFIX as GEOREFERENCER
 from ..geometry.georeferencer import write_georeferencer
 from ..geometry.point_tables import SIGMA
-from ..geometry.tie_point_files import EDITED, read_tie_points, write_tie_points
 from ..geometry.tie_point_files import SUFFIXES as TIE_POINT_SUFFIXES
-from ..geometry.tie_points import USED, TiePoints
+from ..geometry.tie_point_files import read_tie_points, write_tie_points
+from ..geometry.tie_points import EDITED, USED, TiePoints
 from ..geometry.transform import Transform
 from ..rasters.atomic import writing
 from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject
@@ -67,7 +67,7 @@ class ControlPoints:
     @property
     def by_hand(self) -> int:
         """How many of the points a person moved or added."""
-        return int(np.sum(self.points.more.get(EDITED, 0.0)))
+        return int(self.points.edited.sum())
 
     @property
     def lon_lat(self) -> FloatArray:
