@@ -24,7 +24,7 @@ from ..masks.values import INSIDE, RasterMask, mask_values
 from ..progress import Progress
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
-from ..rasters.pair import ImagePair
+from ..rasters.pair import Image, ImagePair
 from ..rasters.reading import RasterSource, open_raster
 from .scene import located, scene_of
 
@@ -112,6 +112,11 @@ class UserMask:
         named = isinstance(self.mask, (str, Path))
         return file_name(self.mask) if named else str(getattr(self.mask, "name", "the mask"))
 
+    def noted(self, image: Image, share: float, of: object) -> Image:
+        """Return an image that states of this mask what it means, and which share it keeps."""
+        note = f"{self.name}{self.origin} keeps {share:.0%} of {of}"
+        return replace(image, mask_note=note, mask_hides=self.values is not None)
+
     def summary(self) -> dict[str, Any]:
         """Return it as values that JSON can carry."""
         return {"name": self.name, "values": self.values, "found_beside": bool(self.origin)}
@@ -155,8 +160,7 @@ def with_user_masks(
         mask = given if isinstance(given, UserMask) else UserMask(given)
         if mask.is_zeros:
             raster = stack.enter_context(open_raster(mask.mask))
-            image = getattr(pair, name).masked(raster, pair.grid)
-            pair = replace(pair, **{name: image})
+            pair = replace(pair, **{name: getattr(pair, name).masked(raster, pair.grid)})
             continue
         scene = scene_of(pair, name)
         if mask.is_layer or mask.values is not None:
@@ -166,11 +170,9 @@ def with_user_masks(
         pair, share = with_mask(pair, name, scene, select, stack, context)
         if mask.is_layer and mask.values is None:
             used = MaskUsed(LAYER, name, share, f"what {mask.name} covers")
-        note = f"{mask.name}{mask.origin} keeps {share:.0%} of the {name}"
-        hides = mask.values is not None
-        image = replace(getattr(pair, name), mask_note=note, mask_hides=hides)
+        image: Any = mask.noted(getattr(pair, name), share, f"the {name}")
         pair = replace(pair, **{name: image})
-        context.update(1.0, note)
+        context.update(1.0, image.mask_note)
     return pair, used
 
 

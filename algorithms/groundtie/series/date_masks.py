@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..masks.scene import Scene, Select, Selection
 from ..progress import Progress
@@ -12,34 +12,8 @@ from ..rasters.reading import RasterSource, Window, open_raster
 from ..registration.user_masks import UserMask, drawn_mask, select_drawn
 
 
-@dataclass(frozen=True)
-class DateMask:
-    """A mask on the pixels of a date.
-
-    Parameters
-    ----------
-    raster
-        1 where pixels take part, else 0; on the date's own grid.
-    hides
-        See `Image.mask_hides`.
-    note
-        What a user should know of it.
-    """
-
-    raster: RasterSource
-    hides: bool
-    note: str
-
-    def on(self, image: Image) -> Image:
-        """Return the date's image with this mask, wherever its pixels were moved."""
-        moved = replace(self.raster, grid=image.source.grid)
-        return replace(image, mask=moved, mask_hides=self.hides, mask_note=self.note)
-
-
-def draw_mask(
-    source: RasterSource, mask: UserMask, stack: ExitStack, progress: Progress
-) -> DateMask:
-    """Draw a raster, or a layer of what takes no part, on the pixels of a date.
+def draw_mask(source: RasterSource, mask: UserMask, stack: ExitStack, progress: Progress) -> Image:
+    """Return a date with a mask on its own pixels, drawn of a raster or a layer of what is hidden.
 
     Parameters
     ----------
@@ -56,8 +30,7 @@ def draw_mask(
     with ExitStack() as own:
         select = _selection(scene, source, mask, own)
         raster, share = drawn_mask(scene, select, stack, progress)
-    note = f"{mask.name}{mask.origin} keeps {share:.0%} of {source.path}"
-    return DateMask(raster, mask.values is not None, note)
+    return mask.noted(replace(Image(source), mask=raster), share, source.path)
 
 
 def _selection(scene: Scene, source: RasterSource, mask: UserMask, stack: ExitStack) -> Select:

@@ -29,7 +29,7 @@ from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
 from ..runs import digest, file_facts
 from ..vrt_sources import sources_of
-from .date_masks import DateMask, draw_mask
+from .date_masks import draw_mask
 from .inputs import Listed
 
 # Footprints are drawn on images reduced to this, on their longer side.
@@ -59,15 +59,15 @@ class Date:
         What is matched of it: the same, or its grey image in memory.
     band
         Which band of the file that is; None: the mean of all.
-    mask
-        Its mask, on its own pixels; None: it has none, or one that each pair makes.
+    drawn
+        It with its mask, on its own pixels; None: it has none, or one that each pair makes.
     """
 
     listed: Listed
     source: RasterSource
     matched: Image
     band: int | None
-    mask: DateMask | None = None
+    drawn: Image | None = None
 
     @property
     def name(self) -> str:
@@ -79,13 +79,17 @@ class Date:
         return replace(self.matched, source=replace(self.matched.source, grid=grid))
 
     def masked(self, image: Image) -> Image:
-        """Return its image in a pair with its mask."""
-        return image if self.mask is None else self.mask.on(image)
+        """Return its image in a pair with its mask, wherever its pixels were moved."""
+        if self.drawn is None or self.drawn.mask is None:
+            return image
+        moved = replace(self.drawn.mask, grid=image.source.grid)
+        note, hides = self.drawn.mask_note, self.drawn.mask_hides
+        return replace(image, mask=moved, mask_note=note, mask_hides=hides)
 
     @property
     def pair_mask(self) -> UserMask | None:
         """The mask that each pair makes; None: there is none."""
-        return None if self.mask is not None else self.listed.mask
+        return None if self.drawn is not None else self.listed.mask
 
     @cached_property
     def is_radar(self) -> bool:
@@ -178,14 +182,14 @@ def open_dates(
         try:
             source = stack.enter_context(open_raster(one.raster))
             held_bytes += source.grid.width * source.grid.height * np.dtype(np.float32).itemsize
-            mask = None
+            drawn = None
             if one.mask is not None and one.mask.is_drawn:
-                mask = draw_mask(source, one.mask, stack, context.quiet().progress)
-                context.update(number / len(listed), mask.note)
+                drawn = draw_mask(source, one.mask, stack, context.quiet().progress)
+                context.update(number / len(listed), drawn.mask_note)
             matched = Image(source, band)
             if held_bytes <= most_bytes:
                 matched = Image(held_grey(source, band))  # of the band that is matched alone
-            date = Date(one, source, matched, band, mask)
+            date = Date(one, source, matched, band, drawn)
             date.read(with_footprints)
             dates.append(date)
         except CancelledError:
