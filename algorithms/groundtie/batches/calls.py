@@ -107,14 +107,12 @@ def _call(
     values = {
         p.name: _value(p, row.get(p.name), name, inputs, outputs) for p in tool.all_parameters
     }
-    for parameter in tool.parameters:
-        path = values[parameter.name]
+    asked = [p.name for p in tool.parameters if _is_output(p) and values[p.name] is not None]
+    for key in asked:
         # Not by the rows: one that fails must not remove what another one is about to use.
-        if path is not None and _is_output(parameter):
-            make_folder(path.parent)
+        make_folder(values[key].parent)
     checked = tool.check(values)
-    written = {p.name: checked[p.name] for p in tool.parameters if _is_output(p)}
-    written = {key: path for key, path in written.items() if path is not None}
+    written = {key: checked[key] for key in asked}
     places = sorted((key, str(path)) for key, path in written.items())
     call = Call(number, name, checked, written)
     read = facts_read(tool, checked, tuple(files_written(tool, call)), listed)
