@@ -310,22 +310,15 @@ class ToolCommand(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the options, and then the options for experts."""
-        declared = self.tool.parameters
-        arguments = [p for p in declared if p.positional]
-        plain = [p for p in declared if not p.positional and not p.kind.advanced]
-        advanced = [p for p in declared if not p.positional and p.kind.advanced]
-        common = [(_synopsis(p), _describe(p)) for p in self.tool.common]
-        common += [
-            record
-            for option in self.get_params(ctx)[len(self.tool.all_parameters) :]
-            if (record := option.get_help_record(ctx))
-        ]
-        for title, parameters, more in (
-            ("Arguments", arguments, []),
-            ("Options", plain, common),
-            ("Advanced options", advanced, []),
-        ):
-            rows = [(_synopsis(p), _describe(p)) for p in parameters] + more
+        sections: dict[str, list[tuple[str, str]]] = {
+            title: [] for title in ("Arguments", "Options", "Advanced options")
+        }
+        for p in self.tool.all_parameters:
+            option = "Advanced options" if p.kind.advanced else "Options"
+            sections["Arguments" if p.positional else option].append((_synopsis(p), _describe(p)))
+        own = self.get_params(ctx)[len(self.tool.all_parameters) :]
+        sections["Options"] += filter(None, (option.get_help_record(ctx) for option in own))
+        for title, rows in sections.items():
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
