@@ -90,7 +90,7 @@ def test_thumbnails_show_the_ground_on_a_map_of_another_crs(tmp_path: Path) -> N
         dates = (found.dates[0], one, found.dates[2])
         report = SeriesReport.of(replace(found, dates=dates, map_grid=there))
         (shown,) = report.values()["thumbnails"]
-    for uri in (shown.nominal, shown.registered):
+    for uri in (shown["nominal"], shown["registered"]):
         data = np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8)
         picture = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
         assert picture is not None and np.ptp(picture[50:-50, 50:-50].astype(int)) > 200

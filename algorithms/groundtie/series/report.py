@@ -21,16 +21,6 @@ _MOST_SHOWN = 100
 
 
 @dataclass(frozen=True)
-class Thumbnail:
-    """A date as it was, and as it was registered, as data URIs."""
-
-    name: str
-    time: str
-    nominal: str
-    registered: str
-
-
-@dataclass(frozen=True)
 class SeriesReport(Page):
     """What is shown of a series, whatever became of it.
 
@@ -75,7 +65,8 @@ class SeriesReport(Page):
             "ratio": series.map_grid.width / series.map_grid.height,
         }
 
-    def _thumbnails(self, dates: list[SeriesDate]) -> list[Thumbnail]:
+    def _thumbnails(self, dates: list[SeriesDate]) -> list[dict[str, str]]:
+        """Return each date as it was, and as it was registered, as data URIs."""
         grid = pictures.overview_grid(self.series.map_grid, _THUMBNAIL_PX)
         found = []
         for one in dates:
@@ -91,7 +82,8 @@ class SeriesReport(Page):
                 for positions in to_px
             ]
             time = one.listed.time
-            found.append(Thumbnail(one.name, "" if time is None else f"{time:%Y-%m-%d}", *uris))
+            day = "" if time is None else f"{time:%Y-%m-%d}"
+            found.append({"name": one.name, "time": day, "nominal": uris[0], "registered": uris[1]})
         return found
 
 
