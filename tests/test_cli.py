@@ -21,7 +21,7 @@ from typing import Any
 import click
 import pytest
 import toys
-from own_processes import ENVIRONMENT, read_until
+from own_processes import ENVIRONMENT, interrupted, read_until
 from toys import TOY, run_tools
 
 from groundtie.cli import main
@@ -328,16 +328,9 @@ def start(words: str, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_cancels_in_one_line_and_leaves_nothing(number: signal.Signals) -> None:
-    primary, secondary = pty.openpty()
-    process = start(f"{GOOD} --mode wait", stderr=secondary)
-    os.close(secondary)
-    read_until(primary, "half of it\x1b[K")  # the tool is at work
-    process.send_signal(number)
-    rest = read_until(primary, "\n")
-    os.close(primary)
-    out, _ = process.communicate(timeout=60)
-    assert process.returncode == 128 + number
-    assert out == ""
+    command = [sys.executable, toys.__file__, *GOOD.split(), "--mode", "wait"]
+    code, out, rest = interrupted(command, "half of it\x1b[K", number)  # the tool is at work
+    assert (code, out) == (128 + number, "")
     assert rest == "\r\x1b[Kgroundtie: error: cancelled; nothing was written\r\n"
     assert list(Path().iterdir()) == []
 

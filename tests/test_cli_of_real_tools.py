@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import signal
 import subprocess
 import sys
@@ -14,7 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 from noise_pairs import ORIGIN, POINTS, true_input_px, write_pair, write_raster
-from own_processes import ENVIRONMENT, read_until
+from own_processes import ENVIRONMENT, interrupted
 
 from groundtie import load_transform
 
@@ -108,23 +106,10 @@ class TestRealTools:
     @pytest.mark.slow
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     def test_a_signal_in_the_middle_leaves_nothing(self, number: signal.Signals) -> None:
-        primary, secondary = pty.openpty()
         words = "coregister here/reference.tif here/input.tif out/o.tif --report out/r.html"
-        process = subprocess.Popen(
-            [sys.executable, "-m", "groundtie", *words.split()],
-            env=ENVIRONMENT,
-            stdout=subprocess.PIPE,
-            stderr=secondary,
-            text=True,
-        )
-        os.close(secondary)
-        read_until(primary, "matching tie points\x1b[K")
-        process.send_signal(number)
-        rest = read_until(primary, "\n")
-        os.close(primary)
-        out, _ = process.communicate(timeout=60)
-        assert process.returncode == 128 + number
-        assert out == ""
+        command = [sys.executable, "-m", "groundtie", *words.split()]
+        code, out, rest = interrupted(command, "matching tie points\x1b[K", number)
+        assert (code, out) == (128 + number, "")
         assert rest.endswith("\r\x1b[Kgroundtie: error: cancelled; nothing was written\r\n")
         assert list(Path("out").iterdir()) == []
 
