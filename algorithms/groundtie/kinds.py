@@ -174,10 +174,9 @@ class RasterOut(OutputKind):
 
 @dataclass(frozen=True, kw_only=True)
 class VectorOut(OutputKind):
-    """A vector layer that is written; on maps it is drawn in the plugin's style of that name."""
+    """A vector layer of points that is written; QGIS draws its lines as those of tie points."""
 
     suffixes: tuple[str, ...] = (".gpkg", ".geojson")
-    style: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

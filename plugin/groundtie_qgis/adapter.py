@@ -172,8 +172,7 @@ class ToolAlgorithm(NamedAlgorithm):
         for parameter in self._tool.parameters:
             path, kind = values[parameter.name], parameter.kind
             if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
-                style = getattr(kind, "style", "")
-                layers.add(str(path), context, style, self._alike.get(parameter.name))
+                layers.add(str(path), context, self._alike.get(parameter.name))
             for name in getattr(kind, "shows", ()) if path is not None else ():
                 load_on_completion(path / name, context)
                 layers.add(str(path / name), context)

@@ -1,4 +1,4 @@
-"""How the layers of a run look and where they lie: `styles/NAME.qml` is the style NAME."""
+"""How the layers of a run look and where they lie."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from .compat import LINE
 from .library import FOLDER
 
 ICON = FOLDER / "icons" / "groundtie.svg"
+TIE_POINTS = FOLDER / "styles" / "tie_points.qml"
 
 
 def icon_of(name: str) -> Path:
@@ -47,16 +48,15 @@ class LoadedLayers:
         self,
         path: str,
         context: QgsProcessingContext,
-        style: str = "",
         renderer: QgsRasterRenderer | None = None,
     ) -> None:
         """Have the layer of the file `path` finished, if the run's context loads it.
 
-        Lines get the style of a name, rasters the renderer of another raster.
+        Lines are drawn as tie points, rasters by the renderer of another raster.
         """
         if context.willLoadLayerOnCompletion(path):
             details = context.layerToLoadOnCompletionDetails(path)
-            processor = LayerFinisher(self, details.project, style, renderer)
+            processor = LayerFinisher(self, details.project, renderer)
             self._count += 1
             _keep(processor)
             details.setPostProcessor(processor)
@@ -82,13 +82,11 @@ class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
         self,
         layers: LoadedLayers,
         project: QgsProject,
-        style: str = "",
         renderer: QgsRasterRenderer | None = None,
     ) -> None:
         super().__init__()
         self._layers = layers
         self._project = project
-        self._style = style
         self._renderer = renderer
 
     def postProcessLayer(
@@ -97,15 +95,15 @@ class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
         """Finish `layer` (called by QGIS in the main thread)."""
         if layer is None:
             return
-        if self._style and isinstance(layer, QgsVectorLayer) and layer.geometryType() == LINE:
-            _load_style(layer, self._style, feedback)
+        if isinstance(layer, QgsVectorLayer) and layer.geometryType() == LINE:
+            _draw_as_tie_points(layer, feedback)
         if self._renderer is not None and isinstance(layer, QgsRasterLayer):
             draw_alike(layer, self._renderer)
         self._layers.place(layer, self._project)
 
 
-def _load_style(layer: QgsVectorLayer, style: str, feedback: QgsProcessingFeedback) -> None:
-    message, loaded = layer.loadNamedStyle(str(FOLDER / "styles" / f"{style}.qml"))
+def _draw_as_tie_points(layer: QgsVectorLayer, feedback: QgsProcessingFeedback) -> None:
+    message, loaded = layer.loadNamedStyle(str(TIE_POINTS))
     if loaded:
         layer.triggerRepaint()
     else:

@@ -108,14 +108,3 @@ def test_a_simulated_pair_is_loaded(desktop: Any, tmp_path: Path) -> None:
     assert [group.name() for group in root.children()] == ["Simulate a SAR–optical pair"]
     assert all(layer.isValid() for layer in root.layerOrder())
     assert Path(root.layerOrder()[0].source()).is_relative_to(tmp_path / "pair")
-
-
-def test_residuals_of_rpcs_are_drawn_as_tie_points_are(provider: Any) -> None:
-    from groundtie_qgis.library import library_module
-
-    tools = library_module("tools")
-    styles = {
-        name: tools.load_tool(name).parameter(parameter).kind.style
-        for name, parameter in (("refine_rpc", "residuals"), ("coregister", "tie_points"))
-    }
-    assert set(styles.values()) == {"tie_points"}

@@ -39,12 +39,7 @@ def tie_points(*rows: tuple[str, str, float]) -> Any:
     return layer
 
 
-def process(layer: Any) -> str:
-    """Have the post-processor of tie points style a layer; return the log."""
-    return finish(layer, style="tie_points")
-
-
-def finish(layer: Any, **how: Any) -> str:
+def process(layer: Any, **how: Any) -> str:
     """Finish a layer that is in no project; return the log."""
     from groundtie_qgis.styling import LayerFinisher, LoadedLayers
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback, QgsProject
@@ -137,8 +132,11 @@ def test_other_layers_are_left_alone(plugin: Any) -> None:
     assert process(None) == ""
 
 
-def test_a_style_that_cannot_be_read_is_told(plugin: Any) -> None:
-    log = finish(tie_points(("fit", "used", 1.0)), style="no_such_style")
+def test_a_style_that_cannot_be_read_is_told(plugin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from groundtie_qgis import styling
+
+    monkeypatch.setattr(styling, "TIE_POINTS", Path("no_such_style.qml"))
+    log = process(tie_points(("fit", "used", 1.0)))
     assert "the layer tie_points is not styled" in log
 
 
@@ -161,8 +159,8 @@ def processor_of(context: Any, path: Path) -> Any:
 def test_only_layers_to_be_loaded_get_a_post_processor(plugin: Any, tmp_path: Path) -> None:
     wanted, other = tmp_path / "a.gpkg", tmp_path / "b.gpkg"
     context, project, layers = run_of([wanted])
-    layers.add(str(wanted), context, "tie_points")
-    layers.add(str(other), context, "tie_points")
+    layers.add(str(wanted), context)
+    layers.add(str(other), context)
     assert processor_of(context, wanted) is not None
     assert list(context.layersToLoadOnCompletion()) == [str(wanted)]
     del project
@@ -175,7 +173,7 @@ def test_every_run_has_a_post_processor_of_its_own(plugin: Any, tmp_path: Path) 
 
     def context_with_style() -> Any:
         context, project, layers = run_of([path])
-        layers.add(str(path), context, "tie_points")
+        layers.add(str(path), context)
         return context, project
 
     first = context_with_style()
@@ -262,7 +260,7 @@ def test_a_registered_raster_is_drawn_as_the_input(plugin: Any, tmp_path: Path) 
     # Newer ones leave out what is masked.
     if Qgis.versionInt() < 34_000:
         assert made.renderer().contrastEnhancement().minimumValue() < 50
-    assert finish(made, renderer=given.renderer().clone()) == ""
+    assert process(made, renderer=given.renderer().clone()) == ""
     stretch = made.renderer().contrastEnhancement()
     assert stretch.minimumValue() > 90
     assert made.renderer().alphaBand() == alpha
@@ -273,5 +271,5 @@ def test_a_raster_with_fewer_bands_keeps_its_own_renderer(plugin: Any, tmp_path:
 
     made = QgsRasterLayer(str(write(tmp_path / "a.tif")), "registered")
     fourth = QgsSingleBandGrayRenderer(made.dataProvider(), 4)
-    finish(made, renderer=fourth)
+    process(made, renderer=fourth)
     assert made.renderer().usesBands() == [1]

@@ -32,7 +32,6 @@ def extract_gcps(
             help="Points with position in the image and on the map, height, covariance and scores; "
             ".txt holds options of gdal_translate.",
             suffixes=SUFFIXES,
-            style="tie_points",
         ),
     ],
     dem: sensor.Dem = None,

@@ -72,7 +72,6 @@ def refine_rpc(
             "they are.",
             suffixes=SUFFIXES[:3],
             shown=True,
-            style="tie_points",
         ),
     ] = None,
     report: Annotated[

@@ -47,7 +47,6 @@ TiePointsOut = Annotated[
         help="Lines from where a point of the input nominally lies to where it is.",
         suffixes=SUFFIXES,
         shown=True,
-        style="tie_points",
     ),
 ]
 DisplacementOut = Annotated[
