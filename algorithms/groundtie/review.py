@@ -39,7 +39,7 @@ from .steps import similarity_surface
 
 SWITCHED_OFF = "rejected: by a person"
 
-# A spline's system grows with the cube of its points: with more, it is fitted only when asked for
+# A spline's system grows with the cube of its points: with more, none is offered
 # (tests/test_review.py holds all other models of 2000 points to the time of a refit).
 MOST_SPLINE_POINTS = 300
 
@@ -197,8 +197,6 @@ class Review:
     def _left_out_px(self, kind: str) -> float | None:
         """Return the error at points that a model has not seen, block by block of neighbours."""
         taken = np.flatnonzero(self.points.fit)
-        if kind == "tps" and len(taken) > MOST_SPLINE_POINTS:
-            return None
         errors = np.full(len(taken), np.nan)
         for block in left_out_blocks(self.points.reference_xy[taken]):
             if (~block).sum() < max(fewest_points(kind), 3):
