@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from own_processes import ENVIRONMENT
 
-from groundtie.packages import PACKAGES, missing, needed_by_all, needed_for, use_one_thread
+from groundtie.packages import PACKAGES, needed_for, use_one_thread
 from groundtie.tools import NAMES
 
 PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
@@ -41,14 +41,17 @@ def test_calls_need_what_their_tool_and_their_files_need() -> None:
     assert names("coregister", "o.tif") == []
     assert names("coregister", "o.tif", "p.GPKG", "r.html") == ["fiona", "jinja2", "matplotlib"]
     assert names("train_feature_classifier") == ["scikit-learn"]
-    assert {"numpy", "rasterio"} <= {package.name for package in needed_by_all()}
-    assert "click" not in {package.name for package in needed_by_all()}
+    by_all = {package.name for package in PACKAGES if package.needed_by_all}
+    assert {"numpy", "rasterio"} <= by_all
+    assert "click" not in by_all
 
 
-def test_what_is_not_here_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert missing(needed_by_all()) == []
+def test_what_is_not_here_is_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    needed = [package for package in PACKAGES if package.needed_by_all]
+    assert all(package.found() for package in needed)
     monkeypatch.setitem(sys.modules, "cv2", None)
-    assert missing(needed_by_all()) == ["opencv-python-headless"]
+    absent = [package.name for package in needed if not package.found()]
+    assert absent == ["opencv-python-headless"]
 
 
 def test_libraries_work_in_the_calling_thread_unless_stated(

@@ -101,16 +101,6 @@ _THREADS_OF = (
 )
 
 
-def missing(packages: Iterable[Package]) -> list[str]:
-    """Return the names of those of some packages that are not here."""
-    return [package.name for package in packages if not package.found()]
-
-
-def needed_by_all() -> list[Package]:
-    """Return what no tool runs without."""
-    return [package for package in PACKAGES if package.needed_by_all]
-
-
 def needed_for(tool: str, paths: Iterable[PurePath]) -> list[Package]:
     """Return what a call of a tool needs besides: for itself, and for its files."""
     endings = {path.suffix.lower() for path in paths}

@@ -18,12 +18,12 @@ _LOCK = threading.RLock()
 
 def missing_packages() -> list[str]:
     """Return the distributions that all tools need and that are not found."""
-    return list(packages.missing(packages.needed_by_all()))
+    return [p.name for p in packages.PACKAGES if p.needed_by_all and not p.found()]
 
 
 def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
     """Return the distributions that are not found of those that a call of a tool needs beside."""
-    return list(packages.missing(packages.needed_for(tool, paths)))
+    return [p.name for p in packages.needed_for(tool, paths) if not p.found()]
 
 
 def complaint(missing: list[str]) -> str:
