@@ -142,11 +142,15 @@ class PairResult:
         found = cls(**values)
         if not found.accepted:
             return found
-        displacement = np.array(found.displacement, float).reshape(PARAMETERS)
-        covariance = np.array(found.covariance, float).reshape(PARAMETERS, PARAMETERS)
+        return found.placed(np.array(found.displacement, float), np.array(found.covariance, float))
+
+    def placed(self, displacement: FloatArray, covariance: FloatArray) -> PairResult:
+        """Return the result as accepted, with a displacement, (6,), and its covariance, (6, 6)."""
+        covariance = covariance.reshape(PARAMETERS, PARAMETERS)
         return replace(
-            found,
-            displacement=tuple(displacement.tolist()),
+            self,
+            accepted=True,
+            displacement=tuple(displacement.reshape(PARAMETERS).tolist()),
             covariance=tuple(map(tuple, covariance.tolist())),
         )
 
@@ -216,15 +220,8 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     """Register one date to another; the context gives threads, progress and seed."""
     first, second, settings, frame = task.first, task.second, task.settings, task.frame
     started = time.perf_counter()
-    refused = PairResult(
-        first.name,
-        second.name,
-        pair_key(first, second, settings, frame),
-        False,
-        "",
-        "",
-        is_placed=settings.is_placed,
-    )
+    key, is_placed = pair_key(first, second, settings, frame), settings.is_placed
+    refused = PairResult(first.name, second.name, key, False, "", "", is_placed=is_placed)
     spec = settings.specification(first, second)
     grids = [
         date.source.grid if one is None else frame.moved_grid(date.source.grid, one)
@@ -258,13 +255,7 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     )
     if not verdict.accepted:
         return judged
-    displacement, covariance = _measured(found, first, second, grids, frame)
-    return replace(
-        judged,
-        accepted=True,
-        displacement=tuple(displacement.tolist()),
-        covariance=tuple(map(tuple, covariance.tolist())),
-    )
+    return judged.placed(*_measured(found, first, second, grids, frame))
 
 
 def _measured(
