@@ -47,32 +47,39 @@ def stop_requested() -> bool:
 
 
 class Threads(ThreadPoolExecutor):
-    """Threads of this process; tasks that ask `stop_requested` end soon."""
+    """Threads of this process; tasks that ask `stop_requested` end soon.
 
-    def __init__(self, workers: int) -> None:
-        self._stop = threading.Event()
+    Parameters
+    ----------
+    workers
+        How many.
+    stop
+        What is set to ask them; None: an event of threads.
+    """
+
+    def __init__(self, workers: int, stop: Any = None) -> None:
+        self._stop = stop or threading.Event()
         super().__init__(workers, initializer=_heed, initargs=(self._stop.is_set,))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the threads; with `cancel_futures` ask running tasks to stop."""
+        """End all; with `cancel_futures` ask running tasks to stop."""
         if cancel_futures:
             self._stop.set()
         super().shutdown(wait, cancel_futures=cancel_futures)
 
 
-class Processes(Executor):
-    """Processes of this machine, of which one that dies costs no other's task.
+class Processes(Threads):
+    """Threads of which each has a process of its own: one that dies costs no other's task.
 
-    Each thread of a pool has a process of its own, which is known to have run the task by which
-    it died: that task runs again in a new one. Nothing is forked, as threads of OpenCV and GDAL do
-    not survive it: modules that use this at import need `if __name__ == "__main__"`.
+    It is known to have run the task by which it died: that task runs again in a new one. Nothing is
+    forked, as threads of OpenCV and GDAL do not survive it: modules that use this at import need
+    `if __name__ == "__main__"`.
     """
 
     def __init__(self, workers: int) -> None:
         self._context = multiprocessing.get_context("spawn")
-        self._stop = self._context.Event()
+        super().__init__(workers, self._context.Event())
         self._begun, self._have_none_begun = self._context.Event(), threading.Event()
-        self._threads = ThreadPoolExecutor(workers)
         self._own = threading.local()
         self._pools: list[ProcessPoolExecutor] = []
 
@@ -81,7 +88,7 @@ class Processes(Executor):
 
         Its future raises `WorkerLostError` if its process dies again and again.
         """
-        return self._threads.submit(self._run, fn, *args, **kwargs)
+        return super().submit(self._run, fn, *args, **kwargs)
 
     def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
         # Where none could begin, none is tried with each task until one has begun after all.
@@ -110,10 +117,8 @@ class Processes(Executor):
         return pool
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; with `cancel_futures` ask running tasks to stop."""
-        if cancel_futures:
-            self._stop.set()
-        self._threads.shutdown(wait, cancel_futures=cancel_futures)
+        """End the processes, too."""
+        super().shutdown(wait, cancel_futures=cancel_futures)
         for pool in self._pools:
             pool.shutdown(wait, cancel_futures=cancel_futures)
 
