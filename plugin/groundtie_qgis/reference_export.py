@@ -15,6 +15,7 @@ from qgis.core import (
 from qgis.PyQt.QtCore import QSize
 from qgis.PyQt.QtGui import QImage
 
+from .dependencies import rasterio_env
 from .run import new_file
 from .translation import mark
 
@@ -77,8 +78,6 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
     import numpy as np
     import rasterio
     from rasterio.transform import from_bounds
-
-    from .dependencies import rasterio_env
 
     image = image.convertToFormat(QImage.Format.Format_RGBA8888)
     width, height = image.width(), image.height()

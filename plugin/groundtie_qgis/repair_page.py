@@ -19,6 +19,7 @@ from qgis.PyQt.QtWidgets import (
 )
 
 from .canvas_items import Overlay, PointsItem, clearly
+from .dependencies import rasterio_env
 from .library import errors, library_module
 from .map_tools import ClickTool, DragTool
 from .model_list import BIASES, FIRST_POINTS, model_text, points_text
@@ -103,8 +104,6 @@ class RepairPage(QWidget):
 
     def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
         """Take the ground control of an image with RPCs, which `ortho` shows on the map."""
-        from .dependencies import rasterio_env
-
         review = library_module("review")
         files, dem = outcome.files, image.dem
         with rasterio_env():
@@ -121,8 +120,6 @@ class RepairPage(QWidget):
 
     def open(self, reference: Any, input: Any, path: Any) -> None:
         """Take the tie points of a registration; None: begin with none."""
-        from .dependencies import rasterio_env
-
         review = library_module("review")
         self._reference, self._input, self._sensor = reference, input, None
         with rasterio_env():
@@ -247,8 +244,6 @@ class RepairPage(QWidget):
 
     def add_point(self, reference_xy: Any, input_px: Any) -> None:
         """Add a point, where similarity refines it if that is asked for."""
-        from .dependencies import rasterio_env
-
         score, note = float("nan"), ""
         if self.match.isChecked():
             review = library_module("review")

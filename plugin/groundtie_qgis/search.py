@@ -6,6 +6,7 @@ from typing import Any
 
 from qgis.PyQt import sip
 
+from .dependencies import rasterio_env
 from .library import errors, library_module
 from .start_files import has_rpcs
 
@@ -15,8 +16,6 @@ def usual_radius_m(tool: str, reference: Any, input: Any) -> float:
 
     In pixels where there is no georeferencing; 0 where a layer is gone.
     """
-    from .dependencies import rasterio_env
-
     if any(layer is None or sip.isdeleted(layer) for layer in (reference, input)):
         return 0.0
     opening, specification = (
