@@ -6,7 +6,7 @@ Windows of neighbours overlap: resampled chip by chip, most pixels would be made
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -122,29 +122,37 @@ class ChipWindows:
     hidden: MaskOf | None
 
     def map(
-        self, function: Callable[[Patch, Patch], Iterable[R | None]], context: Context
+        self,
+        function: Callable[[Patch, Patch], Iterable[R]],
+        context: Context,
+        is_kept: Callable[[Patch, Patch], bool] | None = None,
     ) -> tuple[list[int], list[R]]:
         """Return what `function` makes of chips' windows, and the numbers of these chips, in order.
 
         It takes a stack of reference windows, shape (n, h, w), and that of their input windows, and
-        returns what it makes of each, None for a chip that is left out.
+        returns what it makes of each. `is_kept` takes a chip in both images, without what is around
+        it, and returns whether its windows are looked at; None: all are.
         """
         chips = np.arange(len(self.places.centres))
         held = self._read(chips) if self.images.is_held and len(chips) else None
 
-        def of_block(block: _Numbers) -> list[tuple[int, R | None]]:
+        def of_stack(piece: _Piece, stack: _Numbers) -> Iterable[tuple[int, R]]:
+            windows = self._cut(piece, stack)
+            if is_kept is not None:
+                cores = zip(*(of.inner(self.reach_px).images for of in windows), strict=True)
+                kept = [is_kept(*both) for both in cores]
+                if not any(kept):
+                    return ()
+                stack, windows = stack[kept], (windows[0].take(kept), windows[1].take(kept))
+            return zip(stack, function(*windows), strict=True)
+
+        def of_block(block: _Numbers) -> list[tuple[int, R]]:
             piece = held or self._read(block)
             stacks = (block[k : k + self._most] for k in range(0, len(block), self._most))
-            return [
-                one
-                for stack in stacks
-                for one in zip(stack, function(*self._cut(piece, stack)), strict=True)
-            ]
+            return [one for stack in stacks for one in of_stack(piece, stack)]
 
-        blocks = list(self._blocks(chips))
-        done = [one for results in context.map(of_block, blocks) for one in results]
-        done.sort(key=operator.itemgetter(0))
-        found = [(number, result) for number, result in done if result is not None]
+        found = [one for done in context.map(of_block, list(self._blocks(chips))) for one in done]
+        found.sort(key=operator.itemgetter(0))
         return [number for number, _ in found], [result for _, result in found]
 
     @property
@@ -200,16 +208,6 @@ class ChipWindows:
         corners, side = self._corners[stack] - corner, self._side_px
         inside = [np.s_[row : row + side, col : col + side] for col, row in corners]
         return _parts(reference, inside), _parts(input, inside)
-
-
-def of_kept(
-    function: Callable[[Patch, Patch], Iterable[R]], kept: Sequence[bool], one: Patch, other: Patch
-) -> list[R | None]:
-    """Return what a function makes of the windows that are kept of two stacks, None of others."""
-    if not any(kept):
-        return [None] * len(kept)
-    found = iter(function(one.take(kept), other.take(kept)))
-    return [next(found) if is_kept else None for is_kept in kept]
 
 
 def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], Iterable[R]]:

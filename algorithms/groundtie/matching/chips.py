@@ -26,7 +26,7 @@ from ..similarity.surface import (
     similarity_surface,
 )
 from .belief_propagation import Surfaces, propagate
-from .chip_windows import ChipWindows, Resampled, of_kept
+from .chip_windows import ChipWindows, Resampled
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, MaskOf, Places
 
@@ -158,12 +158,10 @@ class ChipMatcher:
             made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
             return np.stack(made, axis=1)
 
-        def of_stacks(reference: Patch, input: Patch) -> list[Surfaces | None]:
-            cores = zip(reference.inner(reach).images, input.inner(reach).images, strict=True)
-            kept = [all(map(self._can_be_matched, both)) for both in cores]
-            return of_kept(surfaces, kept, reference, input)
+        def can_be_matched(reference: Patch, input: Patch) -> bool:
+            return self._can_be_matched(reference) and self._can_be_matched(input)
 
-        kept, found = windows.map(of_stacks, context)
+        kept, found = windows.map(surfaces, context, can_be_matched)
         left_out = np.delete(places.centres, kept, axis=0)
         _log.debug("chips that are not matched lie at %s", left_out.tolist())
         span = 2 * radius_px + 1

@@ -21,9 +21,9 @@ from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
 from ..similarity.pooled import PooledHistogram, smooth
-from ..similarity.surface import SimilaritySettings, Surface, normalise
+from ..similarity.surface import SimilaritySettings, normalise
 from .belief_propagation import Surfaces
-from .chip_windows import ChipWindows, Resampled, of_kept, singly
+from .chip_windows import ChipWindows, Resampled, singly
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, MaskOf, Places
 
@@ -100,16 +100,14 @@ class PooledHistogramMatcher:
         order = 1 if self._is_reference_masked else -1
         windows = self._windows(images, places, radius_px, self.blind)
 
-        def surfaces(template: Patch, search: Patch) -> Surfaces:
+        def surfaces(reference: Patch, input: Patch) -> Surfaces:
+            template, search = self._template_first(reference, input)
             return histogram.surface(template.inner(radius_px), search)[..., ::order, ::order]
 
-        def of_stacks(reference: Patch, input: Patch) -> list[Surface | None]:
-            template, search = self._template_first(reference, input)
-            chips = template.inner(radius_px).images
-            kept = [chip.valid_share >= _LEAST_VALID for chip in chips]
-            return of_kept(surfaces, kept, template, search)
+        def has_ground(reference: Patch, input: Patch) -> bool:
+            return self._template_first(reference, input)[0].valid_share >= _LEAST_VALID
 
-        kept, found = windows.map(of_stacks, context)
+        kept, found = windows.map(surfaces, context, has_ground)
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         normalised = normalise(nats)
