@@ -31,8 +31,7 @@ from groundtie.context import Context
 from groundtie.errors import NothingFoundError, NotRegisteredError
 from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.guided_fit import GuidedFit
-from groundtie.matching.keypoint_fit import KeypointFit
+from groundtie.matching.keypoint_fit import GuidedFit, KeypointFit
 from groundtie.matching.pooled import PooledHistogramMatcher
 from groundtie.matching.surface_fit import SurfaceFit
 from groundtie.progress import Progress

@@ -3,19 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ..errors import TooFewPointsError
 from ..rasters.grid import FloatArray, Grid, PointFunction
+from ..rasters.pair import ImagePair
 from .fitting import fit_model
 from .model_choice import left_out_blocks
 from .models import Frame, Model
 from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model that was fitted on the matching grid.
+
+    Parameters
+    ----------
+    model
+        From pixel positions of the matching grid to where the input nominally has them, in pixels
+        of the same grid.
+    fold_models
+        The same fitted without one block of points after the other, to infer how the model varies.
+    """
+
+    model: Model
+    fold_models: tuple[Model, ...]
 
 
 @dataclass(frozen=True)
@@ -29,13 +47,43 @@ class Estimate:
     points
         The points of the fit, with those that it rejected.
     fold_models
-        The model fitted again without one block of points after the other, from pixel positions
-        of the matching grid to where the input nominally has them, in pixels of this grid.
+        See `Fitted`.
     """
 
     transform: Transform
     points: TiePoints
     fold_models: tuple[PointFunction, ...]
+
+    @classmethod
+    def of(
+        cls, kind: str, fitted: Fitted, points: TiePoints, pair: ImagePair, radius_px: float
+    ) -> Estimate:
+        """Return the estimate by a fitted model, or by the spline that the points bend it to.
+
+        Parameters
+        ----------
+        kind
+            Of the model that was asked for.
+        fitted
+            The model, or what a spline starts from.
+        points
+            Points of the fit.
+        pair
+            The images.
+        radius_px
+            See `fit_thin_plate`.
+
+        Raises
+        ------
+        TooFewPointsError
+            Fewer points agree than a spline needs.
+        """
+        grid = pair.grid
+        nominal = Transform.nominal(grid.crs, pair.input.source.grid)
+        if kind == "tps":
+            fitted = fit_thin_plate(points, nominal, grid, fitted.model, radius_px)
+        transform = replace(nominal, model=fitted.model.on_map(grid.centre_transform))
+        return cls(transform, points, fitted.fold_models)
 
     def folds_on(self, grid: Grid) -> tuple[PointFunction, ...]:
         """Return the models of the folds in pixels of the matching grid of the reference.
@@ -90,7 +138,7 @@ def fit_without_blocks(
 
 def fit_thin_plate(
     points: TiePoints, nominal: Transform, grid: Grid, start: Model, radius_px: float
-) -> tuple[Model, tuple[Model, ...]]:
+) -> Fitted:
     """Fit a thin-plate spline to tie points of which some may be outliers.
 
     Parameters
@@ -106,11 +154,6 @@ def fit_thin_plate(
     radius_px
         How far outliers may have fallen from the truth, in matching pixels.
 
-    Returns
-    -------
-    model, fold_models
-        The spline, and those without one block of points after the other (see `Estimate`).
-
     Raises
     ------
     TooFewPointsError
@@ -125,4 +168,4 @@ def fit_thin_plate(
     area = (2 * radius_px + 1) ** 2
     model, mixture = fit_robustly("tps", px, nominal_px, variances, start, area)
     weights = np.where(mixture.inliers, 1 / (mixture.sigma**2 + variances), 0.0)
-    return model, fit_without_blocks("tps", px, nominal_px, weights)
+    return Fitted(model, fit_without_blocks("tps", px, nominal_px, weights))

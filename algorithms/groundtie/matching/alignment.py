@@ -16,6 +16,7 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..geometry.estimation import Fitted
 from ..geometry.model_choice import (
     CHIPS_PER_PARAMETER,
     choose_simplest,
@@ -43,23 +44,6 @@ _HEIGHT_PASSES = 3
 CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 LINEAR_CANDIDATES = CANDIDATES[:3]
 TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *CANDIDATES[3:])
-
-
-@dataclass(frozen=True)
-class Alignment:
-    """A model that was fitted to surfaces.
-
-    Parameters
-    ----------
-    model
-        From pixel positions of the matching grid to where the input nominally has them, in pixels
-        of the same grid.
-    fold_models
-        The same fitted without one block of chips after the other, to infer how the model varies.
-    """
-
-    model: Model
-    fold_models: tuple[Model, ...]
 
 
 # The four weights of a cubic B-spline, and their derivatives, are polynomials of the way between
@@ -141,7 +125,7 @@ def align(
     prior: Prior,
     start: PointFunction,
     terrain: Terrain | None = None,
-) -> Alignment:
+) -> Fitted:
     """Fit the simplest model that the surfaces justify (see `choose_simplest`).
 
     Its score is the similarity at chips that were left out of its fit.
@@ -165,7 +149,7 @@ def align(
     """
     fields = _fields(px, surfaces, prior)
 
-    def fit(kind: str) -> tuple[Alignment, FloatArray]:
+    def fit(kind: str) -> tuple[Fitted, FloatArray]:
         if kind != kinds[0] and len(px) < CHIPS_PER_PARAMETER * PARAMETERS[kind]:
             raise TooFewPointsError(f"{len(px)} chips are too few for the {kind} model")
         return _align(kind, fields, start, terrain)
@@ -175,7 +159,7 @@ def align(
 
 def _align(
     kind: str, fields: list[_Field], start: PointFunction, terrain: Terrain | None
-) -> tuple[Alignment, FloatArray]:
+) -> tuple[Fitted, FloatArray]:
     """Return the model and the scores of left-out chips."""
     sharp = fields[-1]
     family = Family.of(kind, sharp.px, start, terrain)
@@ -195,7 +179,7 @@ def _align(
         return part.scores(model(part.px))[0]
 
     scores = left_out_scores(sharp.px, models, score)
-    return Alignment(family.model(parameters), models), scores
+    return Fitted(family.model(parameters), models), scores
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:

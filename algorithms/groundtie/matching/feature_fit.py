@@ -9,7 +9,7 @@ from affine import Affine
 
 from ..errors import NothingFoundError, TooFewPointsError
 from ..geometry.chance import log10_false_alarms
-from ..geometry.estimation import fit_without_blocks
+from ..geometry.estimation import Fitted, fit_without_blocks
 from ..geometry.fitting import fit_model
 from ..geometry.model_choice import (
     MATCHES_PER_PARAMETER,
@@ -35,22 +35,9 @@ _RIVAL_ALARMS = -10.0
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A model that matches agree on.
+class Fit(Fitted):
+    """A model that matches agree on; `mixture` has which are inliers."""
 
-    Parameters
-    ----------
-    model
-        From pixel positions of the matching grid to where the input nominally has them, in pixels
-        of the same grid.
-    fold_models
-        The same fitted without one block of matches after the other.
-    mixture
-        Which matches are inliers.
-    """
-
-    model: Model
-    fold_models: tuple[Model, ...]
     mixture: Mixture
 
 

@@ -1,4 +1,4 @@
-"""The hybrid chain's tie points ([Suri2010] 6.9): keypoints near where a coarse model puts them.
+"""Fits that start from keypoints near where a coarse model puts them ([Suri2010] 6.9).
 
 Mutual information on reduced images has found the coarse model; keypoints are matched without a
 limit on the ratio, but only near their prediction. Most of these matches are outliers, which
@@ -7,7 +7,7 @@ fall anywhere in the gate; a robust fit finds the inliers. Chips may refine thei
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..features.matching import GATE_PX
-from ..geometry.estimation import Estimate, fit_thin_plate, jackknife_spread
+from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.tie_points import USED, TiePoints
-from ..geometry.transform import Transform
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray, Grid, apply_affine
 from .chips import ChipMatcher
-from .feature_fit import Fit, fit_matches, require_no_rival
+from .feature_fit import Fit, first_kind, fit_matches, require_no_rival
 from .frames import on_grid
 from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
@@ -52,7 +51,7 @@ _TPS_RADIUS_PX = 5.0
 
 @dataclass(frozen=True)
 class KeypointFit:
-    """Fits a model to keypoints, refined by chips if asked to.
+    """Fits a model to keypoints, refined by chips.
 
     Parameters
     ----------
@@ -61,13 +60,12 @@ class KeypointFit:
     chips
         Fits a model to chips alone where too few keypoints match; its matcher has the masks.
     refinement
-        What chips around the keypoints, and others between them, are matched by. None: matches
-        stay where they were found.
+        What chips around the keypoints, and others between them, are matched by.
     """
 
     matcher: KeypointMatcher
     chips: SurfaceFit
-    refinement: ChipMatcher | None = None
+    refinement: ChipMatcher
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
         """Match keypoints near a coarse model, and fit a model to the matches.
@@ -88,55 +86,39 @@ class KeypointFit:
         AmbiguousPlaceError
             Many of them agree on two.
         """
+        # A spline is fitted last, to what agrees with a polynomial.
+        first = AUTO if kind == "tps" else kind
         try:
-            matches, fit = self._match(coarse, kind, context.part(0.0, 0.7))
+            matches, fit = agreeing_keypoints(self.matcher, coarse, first, context.part(0.0, 0.7))
         except TooFewPointsError:
-            if self.refinement is None:
-                raise
             # What "auto" chooses among chips may bend more than matches of keypoints may.
             chips_kind = "affine" if kind == AUTO else kind
             return self.chips.estimate(coarse, chips_kind, context.part(0.7, 1.0))
-        if self.refinement is not None:
-            refining = self.refinement, kind, matches, coarse
-            try:
-                refined = self._refined(*refining, fit, context.part(0.7, 1.0))
-            except TooFewPointsError:
-                # Keypoints may agree on a wrong model where few match. If chips around it do not
-                # agree, the coarse model may still be right.
-                known = apply_affine(on_grid(coarse, self._grid), matches.px)
-                model = fit_model("affine", matches.px, known)
-                # Without models of its folds: how far it may be wrong is unknown.
-                start = Fit(model, (), fit.mixture)
-                refined = self._refined(*refining, start, context.part(0.7, 1.0))
-            matches, coarse, fit = refined
-        return self._estimate(kind, matches, coarse, fit)
+        try:
+            refined = self._refined(first, matches, coarse, fit, context.part(0.7, 1.0))
+        except TooFewPointsError:
+            # Keypoints may agree on a wrong model where few match. If chips around it do not
+            # agree, the coarse model may still be right.
+            known = apply_affine(on_grid(coarse, self._grid), matches.px)
+            model = fit_model("affine", matches.px, known)
+            # Without models of its folds: how far it may be wrong is unknown.
+            start = Fit(model, (), fit.mixture)
+            refined = self._refined(first, matches, coarse, start, context.part(0.7, 1.0))
+        return self._estimate(kind, *refined)
 
     @property
     def _grid(self) -> Grid:
         return self.matcher.pair.grid
 
-    def _match(self, coarse: Model, kind: str, context: Context) -> tuple[Correspondences, Fit]:
-        """Return matches of keypoints, few enough of each place, and the model of most of them."""
-        everywhere = self.matcher.match(coarse, GATE_PX, context)
-        found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
-        fit = self._fit(kind, found, coarse, context.seed)
-        require_no_rival(found, on_grid(coarse, self._grid), fit.model)
-        return found, fit
-
     def _refined(
-        self,
-        chips: ChipMatcher,
-        kind: str,
-        matches: Correspondences,
-        coarse: Model,
-        fit: Fit,
-        context: Context,
+        self, kind: str, matches: Correspondences, coarse: Model, fit: Fit, context: Context
     ) -> tuple[Correspondences, Model, Fit]:
         """Return chips around keypoints, the model that they were resampled by, and their fit.
 
         Matches with larger errors may have led the first model, `fit`, astray: if chips show it,
         they are matched again from their own.
         """
+        chips = self.refinement
         nominal_px = apply_affine(on_grid(coarse, self._grid), matches.partner_px)
         for _ in range(_ROUNDS):
             first = fit.model
@@ -156,14 +138,10 @@ class KeypointFit:
             centres = np.unique(np.rint(picked).astype(int), axis=0)
             places = Places(self._grid, centres, _CHIP_PX)
             found = chips.match(coarse, places, radius, context).correspondences()
-            fit = self._fit(kind, found, coarse, context.seed)
+            fit = fit_matches(kind, found, on_grid(coarse, self._grid), context.seed)
             if chips.is_settled(fit.model(picked) - first(picked)):
                 break
         return found, coarse, fit
-
-    def _fit(self, kind: str, matches: Correspondences, coarse: Model, seed: int) -> Fit:
-        first_kind = AUTO if kind == "tps" else kind
-        return fit_matches(first_kind, matches, on_grid(coarse, self._grid), seed)
 
     def _estimate(self, kind: str, matches: Correspondences, coarse: Model, fit: Fit) -> Estimate:
         pair, grid = self.matcher.pair, self._grid
@@ -173,18 +151,61 @@ class KeypointFit:
             input_px=pair.nominal_px(coarse(grid.pixel_to_map(matches.partner_px))),
             score=matches.score,
             covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
-            # Partners are each other's nearest.
+            # Peaks are those of both ways together.
             forward_backward_error_px=np.zeros(count),
             is_check=np.zeros(count, bool),
             state=np.full(count, USED),
         )
         points = points.reject(~fit.mixture.inliers, "disagrees with the model")
-        nominal = Transform.nominal(grid.crs, pair.input.source.grid)
-        model, fold_models = fit.model, fit.fold_models
-        if kind == "tps":
-            model, fold_models = fit_thin_plate(points, nominal, grid, model, _TPS_RADIUS_PX)
-        transform = replace(nominal, model=model.on_map(grid.centre_transform))
-        return Estimate(transform, points, fold_models)
+        return Estimate.of(kind, fit, points, pair, _TPS_RADIUS_PX)
+
+
+@dataclass(frozen=True)
+class GuidedFit:
+    """Fits a model to chips all over a pair, around the one that keypoints agree on.
+
+    Keypoints locate an image whose bands or light differ from a coarse model that is many pixels
+    off. They lie where edges are strongest: on roofs, walls and crowns, which may be displaced
+    against the ground. Chips on a regular layout show everything by its area. Source: [Patel2017]
+    4, [Suri2010] 6.9.
+
+    Parameters
+    ----------
+    matcher
+        Matches keypoints.
+    chips
+        Fits the model; it sees no more than `matcher`.
+    """
+
+    matcher: KeypointMatcher
+    chips: SurfaceFit
+
+    def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
+        """Match keypoints near a coarse model and chips near theirs, and fit a model to the chips.
+
+        Parameters and errors as `KeypointFit.estimate` has them; what "auto" chooses from is the
+        chips' own.
+        """
+        # Keypoints need agree on no more to predict where chips match; few matches are enough.
+        first, part = first_kind(kind), context.part(0.0, 0.6)
+        _, fit = agreeing_keypoints(self.matcher, coarse, first, part)
+        model = fit.model.on_map(self.matcher.pair.grid.centre_transform)
+        return self.chips.estimate(model, kind, context.part(0.6, 1.0))
+
+
+def agreeing_keypoints(
+    matcher: KeypointMatcher, coarse: Model, kind: str, context: Context
+) -> tuple[Correspondences, Fit]:
+    """Return matches of keypoints, few enough of each place, and the model of most of them.
+
+    Parameters and errors as `KeypointFit.estimate` has them.
+    """
+    everywhere = matcher.match(coarse, GATE_PX, context)
+    found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
+    prior = on_grid(coarse, matcher.pair.grid)
+    fit = fit_matches(kind, found, prior, context.seed)
+    require_no_rival(found, prior, fit.model)
+    return found, fit
 
 
 def far_from(px: FloatArray, others: NDArray[np.int_], reach_px: float) -> FloatArray:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..geometry.estimation import Fitted
 from ..geometry.models import Model
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import SimilaritySettings
-from .alignment import IDENTITY, Alignment, align
+from .alignment import IDENTITY, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
@@ -147,7 +148,7 @@ def _places(grid: Grid) -> Places:
     return Places.spread(level, chip, lambda side: side // chip)
 
 
-def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Alignment:
+def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Fitted:
     """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
     # Every chip counts the same; none is as low as 1, but for those that show nothing.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import TooFewPointsError
-from ..geometry.estimation import Estimate, fit_thin_plate
+from ..geometry.estimation import Estimate, Fitted
 from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.terrain import Terrain
@@ -21,7 +21,7 @@ from ..kinds import AUTO
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
-from .alignment import CANDIDATES, Alignment, Prior, align
+from .alignment import CANDIDATES, Prior, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .frames import on_grid
@@ -92,21 +92,17 @@ class SurfaceFit:
             surfaces, aligned, expected = self._align(coarse, kind, context)
         surfaces = self.matcher.for_points(surfaces)
         points = fit_points(pair, surfaces, coarse, expected)
-        model, fold_models = aligned.model, aligned.fold_models
-        nominal = Transform.nominal(pair.grid.crs, pair.input.source.grid)
-        if kind == "tps":
-            model, fold_models = fit_thin_plate(points, nominal, pair.grid, model, _NEAR_PX)
-        transform = replace(nominal, model=model.on_map(pair.grid.centre_transform))
-        inliers = _without_outliers(points, transform, pair)
-        if 2 * inliers.used.sum() < PARAMETERS[transform.model.kind]:
+        found = Estimate.of(kind, aligned, points, pair, _NEAR_PX)
+        inliers = _without_outliers(points, found.transform, pair)
+        if 2 * inliers.used.sum() < PARAMETERS[found.transform.model.kind]:
             raise TooFewPointsError(
                 f"only {inliers.used.sum()} of {len(points)} points agree with a model"
             )
-        return Estimate(transform, inliers, fold_models)
+        return replace(found, points=inliers)
 
     def _align(
         self, coarse: Model, kind: str, context: Context
-    ) -> tuple[ChipSurfaces, Alignment, FloatArray]:
+    ) -> tuple[ChipSurfaces, Fitted, FloatArray]:
         """Match the chips of the fit around a model, and align a better one with their surfaces.
 
         Returns the surfaces, the alignment and the shifts that it expects of the chips, (n, 2).

@@ -13,9 +13,8 @@ from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import Check, check_model
 from ..matching.chips import ChipMatcher
-from ..matching.guided_fit import GuidedFit
 from ..matching.held_out import HeldOut
-from ..matching.keypoint_fit import KeypointFit
+from ..matching.keypoint_fit import GuidedFit, KeypointFit
 from ..matching.keypoints import KeypointMatcher
 from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
@@ -197,5 +196,4 @@ def _fit(
     if spec.matcher == KEYPOINTS:
         return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)
     # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
-    fit = SurfaceFit(chips, layout, LINEAR_CANDIDATES)
-    return GuidedFit(KeypointFit(keypoints, SurfaceFit(matcher, layout)), fit)
+    return GuidedFit(keypoints, SurfaceFit(chips, layout, LINEAR_CANDIDATES))
