@@ -8,7 +8,8 @@ the model with the largest sum of similarities is sought.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -24,6 +25,7 @@ from ..geometry.model_choice import (
     left_out_scores,
 )
 from ..geometry.models import PARAMETERS, TERRAIN, Model
+from ..geometry.rows import Rows
 from ..geometry.terrain import Terrain
 from ..rasters.grid import FloatArray, PointFunction, apply_affine
 from ..rasters.kernels import bspline_weights
@@ -54,45 +56,6 @@ _POWERS, _TAPS = np.arange(4), np.arange(-1, 3)
 
 
 @dataclass(frozen=True)
-class _Field:
-    """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
-
-    `px` are the chips' centres, (n, 2), `predicted` where the input was taken to have them;
-    `to_shift` takes distances from there, in nominal pixels, to shifts.
-    """
-
-    px: FloatArray
-    predicted: FloatArray
-    coefficients: FloatArray
-    to_shift: FloatArray
-
-    def take(self, which: NDArray[np.bool_]) -> _Field:
-        return replace(
-            self,
-            px=self.px[which],
-            predicted=self.predicted[which],
-            coefficients=self.coefficients[which],
-        )
-
-    def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
-        linear, side = self.to_shift, self.coefficients.shape[1]
-        shift = (nominal - self.predicted) @ linear.T
-        # Beyond the window a surface is zero, and so is its gradient.
-        place = np.clip(shift + side // 2, 1.0, side - 2.001)
-        inside = np.all(place == shift + side // 2, axis=1)
-        whole = place.astype(int)
-        powers = (place - whole)[..., None] ** _POWERS
-        across, down = (powers @ _SPLINE[:, None]).transpose(2, 1, 0, 3)
-        chips = np.arange(len(place))[:, None, None]
-        rows, cols = (whole[:, axis, None] + _TAPS for axis in (1, 0))
-        patch = self.coefficients[chips, rows[..., None], cols[:, None]]
-        # Value and derivative along rows and along columns, shape (n, 2, 2).
-        found = np.where(inside[:, None, None], down @ patch @ across.swapaxes(1, 2), 0.0)
-        return found[:, 0, 0], np.stack([found[:, 0, 1], found[:, 1, 0]], axis=1) @ linear
-
-
-@dataclass(frozen=True)
 class Prior:
     """What the input was resampled by for matching.
 
@@ -107,6 +70,11 @@ class Prior:
     to_nominal: PointFunction
     linear: FloatArray
 
+    @cached_property
+    def to_shift(self) -> FloatArray:
+        """Takes distances in nominal pixels to those in pixels, shape (2, 2)."""
+        return np.asarray(np.linalg.inv(self.linear), np.float64)
+
     @classmethod
     def of_affine(cls, affine: Affine) -> Prior:
         """Return the prior that an affine transform is."""
@@ -116,6 +84,37 @@ class Prior:
 
 # The input as it is.
 IDENTITY = Prior.of_affine(Affine.identity())
+
+
+@dataclass(frozen=True)
+class _Field(Rows):
+    """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
+
+    `px` are the chips' centres, (n, 2), `predicted` where the input was taken to have them, by
+    `prior`.
+    """
+
+    px: FloatArray
+    predicted: FloatArray
+    coefficients: FloatArray
+    prior: Prior
+
+    def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
+        linear, side = self.prior.to_shift, self.coefficients.shape[1]
+        shift = (nominal - self.predicted) @ linear.T
+        # Beyond the window a surface is zero, and so is its gradient.
+        place = np.clip(shift + side // 2, 1.0, side - 2.001)
+        inside = np.all(place == shift + side // 2, axis=1)
+        whole = place.astype(int)
+        powers = (place - whole)[..., None] ** _POWERS
+        across, down = (powers @ _SPLINE[:, None]).transpose(2, 1, 0, 3)
+        chips = np.arange(len(place))[:, None, None]
+        rows, cols = (whole[:, axis, None] + _TAPS for axis in (1, 0))
+        patch = self.coefficients[chips, rows[..., None], cols[:, None]]
+        # Value and derivative along rows and along columns, shape (n, 2, 2).
+        found = np.where(inside[:, None, None], down @ patch @ across.swapaxes(1, 2), 0.0)
+        return found[:, 0, 0], np.stack([found[:, 0, 1], found[:, 1, 0]], axis=1) @ linear
 
 
 def align(
@@ -186,11 +185,10 @@ def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Fie
     """Return the surfaces to look up, from the most to the least blurred."""
     fields, centres = [], px.astype(float)
     predicted = prior.to_nominal(centres)
-    to_shift = np.asarray(np.linalg.inv(prior.linear), np.float64)
     for blur in _BLURS_PX:
         blurred = (cv2.GaussianBlur(s, (0, 0), blur) if blur else s for s in surfaces)
         coefficients = _spline_coefficients(np.stack(list(blurred)).astype(np.float64))
-        fields.append(_Field(centres, predicted, coefficients, to_shift))
+        fields.append(_Field(centres, predicted, coefficients, prior))
     return fields
 
 

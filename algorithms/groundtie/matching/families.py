@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
 from ..geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, monomials
+from ..geometry.rows import Rows
 from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
 from ..rasters.grid import FloatArray, PointFunction
 
 
 @dataclass(frozen=True)
-class Family:
-    """The models of a kind at some chips: what their parameters make of positions.
+class Family(Rows):
+    """The models of a kind at some chips, a row each: what their parameters make of positions.
 
     Parameters
     ----------
@@ -87,10 +87,6 @@ class Family:
         model = self.model(parameters)
         assert isinstance(model, TerrainModel)
         return self._with_rise(model.rise_m(self.frame.enter(self.px)))
-
-    def take(self, which: NDArray[np.bool_]) -> Family:
-        """Return the family at the chips that a mask selects."""
-        return replace(self, px=self.px[which], rise=self.rise[which])
 
     def _with_rise(self, rise_m: FloatArray) -> Family:
         # Chips of unknown height say nothing on how heights displace.

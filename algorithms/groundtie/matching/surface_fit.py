@@ -125,7 +125,7 @@ class SurfaceFit:
         kinds = self.candidates if kind in (AUTO, "tps") else (kind,)
         aligned = align(kinds, centres, weighted, prior, start, terrain)
         moved = aligned.model(px) - prior.to_nominal(px)
-        return surfaces, aligned, moved @ np.linalg.inv(prior.linear).T
+        return surfaces, aligned, moved @ prior.to_shift.T
 
 
 def _prior_of(model: Model, grid: Grid) -> Prior:
