@@ -17,17 +17,15 @@ _SAMPLE = 65_536
 
 
 def bin_edges(
-    values: NDArray[np.float32], valid: NDArray[np.bool_], bins: int, binning: str
+    known: NDArray[np.float32], bins: int, binning: str = "equal-frequency"
 ) -> NDArray[np.float32]:
-    """Return the inner edges between bins, shape (bins - 1,).
+    """Return the inner edges between bins of values, (n,), shape (bins - 1,).
 
-    Equal-frequency edges are quantiles of the valid values; linear ones divide their range evenly.
+    Equal-frequency edges are quantiles of the values; linear ones divide their range evenly.
     """
-    sample = values[valid]
-    if sample.size > _SAMPLE:
-        sample = sample[:: -(-sample.size // _SAMPLE)]
-    if sample.size == 0:
+    if known.size == 0:
         return np.zeros(bins - 1, np.float32)
+    sample = known[:: -(-known.size // _SAMPLE)]
     inner = np.arange(1, bins) / bins
     if binning == "equal-frequency":
         return quantiles(sample, inner).astype(np.float32)
@@ -54,6 +52,6 @@ def to_bins(
     """
 
     def binned(values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.uint8]:
-        return levels(values, bin_edges(values, valid, bins, binning))
+        return levels(values, bin_edges(values[valid], bins, binning))
 
     return np.where(valid, each(binned, values, valid), MASKED)

@@ -66,11 +66,9 @@ class PooledHistogram:
             Inner edges between levels of the second image; None: as of the first, `BINS` equally
             frequent ones.
         """
-
-        def equal(values: FloatArray) -> FloatArray:
-            return bin_edges(values, np.ones(values.shape, bool), BINS, "equal-frequency")
-
-        edges = equal(template), equal(search) if search_edges is None else search_edges
+        if search_edges is None:
+            search_edges = bin_edges(search, BINS)
+        edges = bin_edges(template, BINS), search_edges
         own, other = (
             levels(s, e).astype(np.intp) for e, s in zip(edges, (template, search), strict=True)
         )

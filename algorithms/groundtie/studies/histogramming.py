@@ -73,7 +73,7 @@ def to_levels(
                 f"the image has more than {MASKED_LEVEL} grey values: give a number of bins"
             )
     else:
-        edges = bin_edges(image.values, image.valid, bins, binning)
+        edges = bin_edges(image.values[image.valid], bins, binning)
     levels = np.searchsorted(edges, image.values.ravel(), side="right").astype(np.uint16)
     levels = levels.reshape(image.values.shape)
     levels[~image.valid] = MASKED_LEVEL
