@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.patch import Patch, reduced_patch
+from ..rasters.patch import Patch, distance_to_masked, reduced_patch
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
-from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS, distance_to_masked
+from .scale_space import FIRST_SCALE_PX, IMAGE_BLUR_PX, LAYERS
 
 ByteImage = NDArray[np.uint8]
 

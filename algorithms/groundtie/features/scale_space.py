@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.patch import distance_to_masked
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import ROUNDING
 from .keypoints import Keypoints
@@ -94,13 +95,6 @@ def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: flo
 
 def _layer_of(scale_px: Any) -> Any:
     return np.rint(LAYERS * np.log2(scale_px / FIRST_SCALE_PX)).astype(int)
-
-
-def distance_to_masked(valid: NDArray[np.bool_]) -> FloatImage:
-    """Return how far each pixel is from a masked one, in pixels; infinite without one."""
-    if valid.all():
-        return np.full(valid.shape, np.inf, np.float32)
-    return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
 def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RasterContentError
 from ..progress import SILENT, Progress
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, distance_to_masked
 from ..rasters.reading import FloatImage, Mask
 from .reduced import BlockMask, ReducedScene, reduction
 from .scene import Scene
@@ -103,19 +103,14 @@ def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     found = np.zeros(level.shape, np.float32)
     with np.errstate(divide="ignore"):  # layover and shadow themselves lie 0 from themselves
         for times, px in (
-            (2, nearest_px(bright)),
-            (2, nearest_px(dark)),
+            (2, distance_to_masked(~bright)),
+            (2, distance_to_masked(~dark)),
             (1, distance_back_px(bright, azimuth_deg)),
             (1, distance_back_px(dark, azimuth_deg + 180)),
         ):
             found += np.float32(times / 6) * np.log(np.minimum(px, np.float32(farthest_px)))
     least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
     return np.asarray((found >= np.log(least_px)) & valid)
-
-
-def nearest_px(mask: Mask) -> FloatImage:
-    """Return how far each pixel lies from the nearest of a mask, shape (h, w)."""
-    return np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5))
 
 
 def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rasters.grid import Grid
-from ..rasters.patch import Patch, middle_window
+from ..rasters.patch import Patch, distance_to_masked, middle_window
 from ..rasters.reading import Mask, Window
 from ..speckle.statistics import (
     HOMOGENEOUS_EXCESS,
@@ -21,7 +21,6 @@ from ..speckle.statistics import (
     local_statistics,
     window_counts,
 )
-from .ground import nearest_px
 from .radar import SAMPLE_PX, power
 from .scene import Scene, Selection
 
@@ -62,7 +61,7 @@ class OpenGround:
         around = window.widened(LOOKS_WINDOW_PX // 2 + _AREA_PX // 2 + self._beside_px)
         patch = self.scene.read(around)
         inside = window.slices_in(around)
-        far = nearest_px(self._areas(patch)) > self._beside_px
+        far = distance_to_masked(~self._areas(patch)) > self._beside_px
         valid = patch.valid[inside]
         return Selection(far[inside] & valid, valid)
 

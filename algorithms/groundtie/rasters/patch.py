@@ -94,6 +94,13 @@ def empty_areas(values: FloatImage, valid: Mask) -> Mask:
     return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
 
 
+def distance_to_masked(valid: Mask) -> FloatImage:
+    """Return how far each pixel is from a masked one, in pixels; infinite without one."""
+    if valid.all():
+        return np.full(valid.shape, np.inf, np.float32)
+    return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+
+
 def is_logarithmic(known: FloatImage) -> bool:
     """Return whether valid grey values, of any shape, are in decibels: many are negative."""
     return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
