@@ -29,6 +29,7 @@ from textured_pairs import (
 import groundtie
 from groundtie.context import Context
 from groundtie.errors import NothingFoundError, NotRegisteredError
+from groundtie.features.detectors import SiftDetector, SiftOctDetector
 from groundtie.geometry.models import Model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.keypoint_fit import GuidedFit, KeypointFit
@@ -212,6 +213,11 @@ def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Cont
             masked = mask_pair(pair, spec, SceneInfo.of(pair.pair), context)
             stages = Stages.of(pair.images, masked, spec)
             assert isinstance(stages.fit, kind)
+            if not isinstance(stages.fit, SurfaceFit):
+                # Radar images are looked at without the octave of their speckle.
+                is_radar = isinstance(stages.fit, KeypointFit)
+                detector = SiftOctDetector(0.03) if is_radar else SiftDetector(0.03)
+                assert stages.fit.matcher.detector == detector
             assert isinstance(stages.matcher, ChipMatcher)
             # All of them are blind to what is held out.
             assert stages.matcher.held_out is stages.held_out

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..context import Context
-from ..features.presets import optical_keypoints, sar_keypoints
+from ..features.descriptors import SiftDescriptor
+from ..features.detectors import SiftDetector, SiftOctDetector
+from ..features.hog import HogDescriptor
 from ..geometry.estimation import Estimate
 from ..geometry.models import TERRAIN, Model, shift_model
 from ..masks.used import NONE
@@ -31,7 +33,7 @@ from .evidence import RegistrationEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
 from .masks import Masked
 from .opening import open_terrain
-from .specification import BOTH, CHIPS, GUIDED_CHIPS, KEYPOINTS, Specification
+from .specification import BOTH, CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
 
@@ -188,12 +190,16 @@ def _fit(
             # Polynomials bend along what no rendering shows: land cover and what is laid over.
             candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
         return SurfaceFit(matcher, layout, candidates, terrain=terrain)
-    presets = {KEYPOINTS: sar_keypoints, GUIDED_CHIPS: optical_keypoints}
-    detector, descriptor = presets[spec.matcher]()
-    masked = None if pair is images else pair
-    keypoints = KeypointMatcher(images, detector, descriptor, held_out=held_out, shown=masked)
+    shown = None if pair is images else pair
     chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
+    # Detectors and descriptors were chosen among many by `detector_repeatability` and `make bench`
+    # (see `studies`).
     if spec.matcher == KEYPOINTS:
+        # Of radar images: upright SIFT-OCT ([Suri2010] 6.3).
+        keypoints = KeypointMatcher(images, SiftOctDetector(), SiftDescriptor(), held_out, shown)
         return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)
+    # HOG patches ([Patel2017] 4.3) are of one size: SIFT's keypoints are too small for patches that
+    # grow with them.
+    keypoints = KeypointMatcher(images, SiftDetector(), HogDescriptor(), held_out, shown)
     # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
     return GuidedFit(keypoints, SurfaceFit(chips, layout, LINEAR_CANDIDATES))
