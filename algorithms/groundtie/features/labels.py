@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +17,7 @@ from ..masks.layer import AREAS, drawn_onto
 from ..masks.scene import sampled_onto
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import Image
+from ..rasters.patch import window_sums
 from ..rasters.reading import RasterSource, Window
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
@@ -115,7 +115,7 @@ def patch_labels(labels: Labels, px: FloatArray) -> Labels:
     of the known pixels of the patch around it is.
     """
     left_out, known = (
-        cv2.blur(which.astype(np.float32), (PATCH_PX, PATCH_PX), borderType=cv2.BORDER_CONSTANT)
+        window_sums(which.astype(np.float32), PATCH_PX)
         for which in (labels == LEFT_OUT, labels != UNKNOWN)
     )
     label = np.where(left_out > _LARGEST_SHARE * known, LEFT_OUT, KEPT)

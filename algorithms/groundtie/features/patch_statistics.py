@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, window_sums
 from ..rasters.reading import FloatImage
 from .hog import PATCH_PX
 
@@ -81,19 +81,12 @@ def patch_statistics(
     # Around the mean, powers of grey values lose no digits.
     centre = float(window.values[window.valid].mean())
     values = np.where(window.valid, window.values - centre, 0.0)
-    counts = _sums(window.valid.astype(np.float64))
+    counts = window_sums(window.valid.astype(np.float64), PATCH_PX)
 
     def means(of: FloatArray) -> FloatArray:
-        sums = _sums(np.where(window.valid, of, 0.0))
+        sums = window_sums(np.where(window.valid, of, 0.0).astype(np.float64), PATCH_PX)
         return np.asarray(sums[rows, cols] / np.maximum(counts[rows, cols], 1))
 
     found = np.column_stack(STATISTICS[name](values, bands, means))
     found[:, 0] += centre
     return found
-
-
-def _sums(values: FloatArray) -> FloatArray:
-    sums = cv2.boxFilter(
-        values, cv2.CV_64F, (PATCH_PX, PATCH_PX), normalize=False, borderType=cv2.BORDER_CONSTANT
-    )
-    return np.asarray(sums)

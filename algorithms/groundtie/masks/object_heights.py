@@ -15,6 +15,7 @@ from ..errors import VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid
 from ..rasters.height_units import in_metres
+from ..rasters.patch import window_sums
 from ..rasters.reading import FloatImage, Mask, RasterSource
 from .layer import AREAS, drawn_onto
 from .ray_casting import Heights
@@ -165,13 +166,7 @@ def _mean_above(blocks: FloatImage, lowest: FloatImage, side: int) -> FloatImage
     steps = np.rint((blocks - lowest[:, None, :, None]) / _STEP_M)
     is_ground = steps <= LOWEST_M / _STEP_M
     total, count = (
-        cv2.boxFilter(
-            values.sum(axis=(1, 3), dtype=np.float64),
-            -1,
-            (side, side),
-            normalize=False,
-            borderType=cv2.BORDER_CONSTANT,
-        )
+        window_sums(values.sum(axis=(1, 3), dtype=np.float64), side)
         for values in (np.where(is_ground, steps, 0), is_ground)
     )
     return (total / np.maximum(count, 1) * _STEP_M).astype(np.float32)

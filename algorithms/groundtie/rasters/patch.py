@@ -94,6 +94,13 @@ def empty_areas(values: FloatImage, valid: Mask) -> Mask:
     return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
 
 
+def window_sums(image: NDArray[Any], side_px: int) -> NDArray[Any]:
+    """Return the sums in square windows around pixels; beyond the image, shape (h, w), is 0."""
+    size = (side_px, side_px)
+    sums = cv2.boxFilter(image, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(sums)
+
+
 def distance_to_masked(valid: Mask) -> FloatImage:
     """Return how far each pixel is from a masked one, in pixels; infinite without one."""
     if valid.all():

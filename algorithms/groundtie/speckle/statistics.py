@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ..rasters.patch import window_sums
 from ..rasters.reading import FloatImage, Mask
 
 # Mean power, squared, below which there is nothing: running sums leave this much behind.
@@ -57,12 +58,9 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
     LocalStatistics
         Both 0 where nothing in the window is valid.
     """
-    size = (window_px, window_px)
-    outside = cv2.BORDER_CONSTANT
+    size, outside = (window_px, window_px), cv2.BORDER_CONSTANT
     # In place as far as may be: masks are made of whole scenes.
-    mean: FloatImage = np.asarray(
-        cv2.boxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside), np.float32
-    )
+    mean: FloatImage = window_sums(intensity, window_px)
     squares: FloatImage = np.asarray(
         cv2.sqrBoxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside),
         np.float32,
@@ -82,15 +80,7 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
 
 def window_counts(valid: Mask, window_px: int) -> FloatImage:
     """Return the number of valid pixels in the window around each pixel, float32 (h, w)."""
-    return np.asarray(
-        cv2.boxFilter(
-            valid.astype(np.float32),
-            cv2.CV_32F,
-            (window_px, window_px),
-            normalize=False,
-            borderType=cv2.BORDER_CONSTANT,
-        )
-    )
+    return window_sums(valid.astype(np.float32), window_px)
 
 
 def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
