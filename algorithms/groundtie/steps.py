@@ -20,7 +20,7 @@ from .arrays import Raster
 from .context import Context, threads
 from .errors import ParameterError, TooFewPointsError
 from .geometry.estimation import Estimate, fit_without_blocks
-from .geometry.models import DEGREE, KINDS, Model, shift_model
+from .geometry.models import KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform, as_positions
@@ -199,8 +199,7 @@ def fit_model(
         )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
-    first = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-    start = find_consensus(px, nominal_px, tolerance_px, first, seed)
+    start = find_consensus(px, nominal_px, tolerance_px, kind, seed)
     model, mixture = fit_robustly(
         kind,
         px,

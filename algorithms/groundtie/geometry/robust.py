@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray
 from .fitting import fit_model
-from .models import Frame, Model, PolynomialModel, fewest_points, monomials
+from .models import DEGREE, Frame, Model, PolynomialModel, fewest_points, monomials
 
 # Where a fifth of the pairs is right, so many samples of three hold a right one with 99 %.
 _SAMPLES = 600
@@ -138,10 +138,11 @@ def find_consensus(
     tolerance
         Distance within which a pair agrees, in pixels.
     kind
-        "translation", "rigid", "similarity" or "affine".
+        One of `models.PARAMETERS`; of those that are more flexible, "affine" is fitted.
     seed
         Of the random samples.
     """
+    kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
     frame = Frame.around(xy)
     uv, displacement = frame.enter(xy), frame.enter(nominal_xy) - frame.enter(xy)
     candidates = _sampled_models(uv, displacement, kind, np.random.default_rng(seed))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.accuracy import NEIGHBOUR_SPACINGS
-from ..geometry.models import DEGREE, Model
+from ..geometry.models import Model
 from ..geometry.robust import CONSENSUS_PX, find_consensus
 from ..rasters.grid import FloatArray, PointFunction
 from ..rasters.pair import ImagePair
@@ -119,8 +119,7 @@ class ChipMatcher:
         px = surfaces.centres.astype(float)
         reach = NEIGHBOUR_SPACINGS * layout.spacing_px
         supported = propagate(surfaces.combined, surfaces.centres, reach)
-        first_kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
-        return find_consensus(px, px + peak_shifts(supported), CONSENSUS_PX, first_kind, seed)
+        return find_consensus(px, px + peak_shifts(supported), CONSENSUS_PX, kind, seed)
 
     def kind_of(self, kind: str) -> str:
         """Return the kind of model that is fitted where one is asked for."""

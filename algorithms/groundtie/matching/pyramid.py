@@ -109,7 +109,7 @@ def _descend(
         finer_factor = max(factor / _STEP, 1.0)
         finer_level = grid if finer_factor == 1 else grid.scaled(finer_factor)
         finer = fit_level(matcher, finer_level, best.model, _reach_px(factor / finer_factor), quiet)
-        if finer.log10_false_alarms < 0:
+        if _alarms(finer) < _HOPELESS:
             best = finer
         factor = finer_factor
     return best.model
@@ -151,7 +151,7 @@ def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) 
     for other in tried:
         apart = level.map_to_pixel(other.model(centre)) - level.map_to_pixel(best.model(centre))
         distance_px = float(np.hypot(*apart[0]))
-        evident = _alarms(other) < min(_RIVAL_EVIDENCE * _alarms(best), _HOPELESS)
+        evident = _alarms(other) < _RIVAL_EVIDENCE * _alarms(best)
         if distance_px > _SAME_PLACE_PX and evident:
             distance = distance_px * level.pixel_size_m
             raise AmbiguousPlaceError(f"two places match about as well, {distance:.0f} m apart")
