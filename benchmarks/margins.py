@@ -18,8 +18,8 @@ import numpy as np
 from groundtie.errors import GroundTieError
 from groundtie.kinds import plain
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
-from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
+from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (

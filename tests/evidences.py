@@ -18,9 +18,8 @@ from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
-from groundtie.matching.surveys import Surveys
+from groundtie.matching.surveys import Rest, Surveys
 from groundtie.registration.evidence import Evidence, RegistrationEvidence
 from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo

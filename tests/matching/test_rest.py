@@ -13,8 +13,8 @@ from groundtie.geometry.transform import Transform
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.locked import EXACT_PX, Sensors
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.rest import Rest, survey_rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
+from groundtie.matching.surveys import Rest, survey_rest
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (

@@ -24,9 +24,8 @@ from evidences import (
 
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
-from groundtie.matching.rest import Rest
 from groundtie.matching.survey import Survey
-from groundtie.matching.surveys import Surveys
+from groundtie.matching.surveys import Rest, Surveys
 from groundtie.registration.pose_verdict import PoseSurveyEvidence
 
 CHIPS = np.stack(np.meshgrid(*[np.arange(5) * 100 + 50] * 2), -1).reshape(-1, 2)

@@ -28,8 +28,8 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
-from groundtie.matching.rest import Rest
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
+from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals

@@ -3,16 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..context import Context
 from ..geometry.transform import Transform
+from ..similarity.surface import SimilaritySettings
+from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import Sensors
+from .locked import Sensors, find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
-from .rest import Rest, survey_rest
-from .survey import Survey, survey_model
+from .survey import Survey, survey_model, survey_places
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What chips show without content that is the same in both arrays.
+
+    Parameters
+    ----------
+    survey
+        What they show; None: it is not asked, as of content that is drawn, and of views that are
+        the same nearly everywhere, or whose edges do not coincide sharply, and which are no less
+        alike in coarser pixels.
+    is_explained
+        Whether such content needs no confirmation (see `LockedContent`).
+    beyond
+        What they show beyond what the reference explains of the input, where it is explained;
+        None elsewhere.
+    chips
+        How many chips there are; of some too little may be left.
+    is_evident
+        Whether there is more of such content than two views of one ground have in common.
+    """
+
+    survey: Survey | None = None
+    is_explained: bool = False
+    beyond: Survey | None = None
+    chips: int = 0
+    is_evident: bool = True
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether such content is drawn over the images: unexplained, and nothing is asked."""
+        return self.survey is None and not self.is_explained
 
 
 @dataclass(frozen=True)
@@ -81,3 +115,61 @@ def survey_all(
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
     return Surveys(whole, rest, ground)
+
+
+def survey_rest(
+    matcher: ChipMatcher,
+    transform: Transform,
+    places: Places,
+    elsewhere_px: float,
+    sensors: Sensors,
+    exact_px: float,
+    context: Context,
+) -> Rest | None:
+    """Return what chips show without content that is the same in both arrays.
+
+    Parameters
+    ----------
+    matcher
+        What the chips are matched by.
+    transform
+        What was found.
+    places
+        The chips.
+    elsewhere_px
+        See `Survey`.
+    sensors
+        What the images may be.
+    exact_px
+        See `find_locked_content`.
+    context
+        Threads and progress.
+
+    Returns
+    -------
+    None where there is no more of such content than two views of one ground have, unless both are
+    a radar's: speckle blurs it; and where none is looked for.
+    """
+    pair, asked = matcher.pair, survey_places(matcher.pair.grid)
+    locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
+    if locked is None or not (locked.is_evident or sensors is Sensors.RADARS):
+        return None
+    # What a mask leaves is little: one measure alone would miss most of it.
+    fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
+    if not locked.is_evident:
+        survey = survey_model(fused, transform.model, places, elsewhere_px, context, locked)
+        return Rest(survey, chips=chips, is_evident=False)
+    if locked.is_drawn:
+        return Rest()
+    left = beyond = None
+    same = locked.sameness
+    is_doubtful = same.has_sharp_edges or same.is_finer_than_ground
+    if not locked.is_explained or (is_doubtful and not same.is_same_view):
+        # Another input leaves something else of the reference.
+        once = replace(context, memo=None)
+        left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)
+    if locked.is_explained:
+        # A copy may be blended into other ground, of which the same windows are no part.
+        other = replace(fused, left_of=unexplained)
+        beyond = survey_model(other, transform.model, places, elsewhere_px, context)
+    return Rest(left, locked.is_explained, beyond, chips)

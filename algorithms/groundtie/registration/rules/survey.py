@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...matching.parts import LEAST_EXCESS
-from ...matching.rest import Rest
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
+from ...matching.surveys import Rest
 from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
