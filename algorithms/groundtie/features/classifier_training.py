@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TooFewPointsError
+from ..geometry.model_choice import blocks_of
 from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray
 from .classifier import DEGREE, OFFSET, FeatureClassifier
@@ -115,10 +116,7 @@ def left_out_accuracy(
     Blocks of neighbouring points are left out of the training together; NaN if the points of a
     class lie too near each other for that.
     """
-    low, high = labelled.px.min(axis=0), labelled.px.max(axis=0)
-    unit = (labelled.px - low) / np.maximum(high - low, 1e-9)
-    block = np.minimum((unit * _BLOCKS).astype(int), _BLOCKS - 1)
-    folds = block.sum(axis=1) % _FOLDS
+    folds = blocks_of(labelled.px, _BLOCKS).sum(axis=1) % _FOLDS
     decided: list[NDArray[np.bool_]] = []
     truth: list[NDArray[np.bool_]] = []
     for fold in range(_FOLDS):

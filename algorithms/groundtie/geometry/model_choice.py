@@ -120,7 +120,7 @@ def left_out_blocks(px: FloatArray) -> list[Mask]:
 
     Neighbours share a fold; each row and each column of blocks holds every fold once.
     """
-    block = _blocks_of(px)
+    block = blocks_of(px)
     folds = (block[:, 0] + 2 * block[:, 1]) % _FOLDS
     return [folds == fold for fold in np.unique(folds)]
 
@@ -135,17 +135,17 @@ def standard_errors(rise: FloatArray, px: FloatArray) -> float:
     px
         Where the points lie, shape (n, 2).
     """
-    block = _blocks_of(px) @ [1, _FOLDS]
+    block = blocks_of(px) @ [1, _FOLDS]
     sums = np.array([rise[block == b].sum() for b in np.unique(block)])
     error = sums.std(ddof=1) * np.sqrt(len(sums)) if len(sums) > 1 else np.inf
     return float(sums.sum() / max(error, 1e-12))
 
 
-def _blocks_of(px: FloatArray) -> NDArray[np.int_]:
+def blocks_of(px: FloatArray, side: int = _FOLDS) -> NDArray[np.int_]:
     """Return the column and row of the block that each point lies in, shape (n, 2).
 
-    The points' extent is cut into as many blocks a side as there are folds.
+    The points' extent is cut into so many blocks a side: mostly as many as there are folds.
     """
     low, high = px.min(axis=0), px.max(axis=0)
     unit = (px - low) / np.maximum(high - low, 1e-12)
-    return np.minimum((unit * _FOLDS).astype(int), _FOLDS - 1)
+    return np.minimum((unit * side).astype(int), side - 1)
