@@ -32,9 +32,6 @@ from .matcher import ChipSurfaces, MaskOf, Places
 
 _log = logging.getLogger(__name__)
 
-# Makes surfaces of the reference's and the input's windows.
-_Way = Callable[[Description, Description, int, SimilaritySettings], Surface]
-
 # Returns stacks of the input's windows, given stacks of the reference's and the input's.
 LeftOf = Callable[[Patch, Patch], Patch]
 
@@ -93,7 +90,7 @@ class ChipMatcher:
         context
             Threads and progress.
         """
-        kept, found = self._run(model, places, radius_px, context, _forward, _backward)
+        kept, found = self._run(model, places, radius_px, context, ways=2)
         forward, backward = found[:, 0], found[:, 1]
         weight = _equal_weight(normalise(forward + backward))
         return ChipSurfaces(kept, forward, backward, weight)
@@ -105,7 +102,7 @@ class ChipMatcher:
 
         Parameters as `match`.
         """
-        kept, found = self._run(model, places, radius_px, context, _forward)
+        kept, found = self._run(model, places, radius_px, context, ways=1)
         return kept, found[:, 0]
 
     def fit_places(self, layout: ChipLayout) -> Places:
@@ -141,12 +138,20 @@ class ChipMatcher:
         return surfaces
 
     def _run(
-        self, model: Model, places: Places, radius_px: int, context: Context, *ways: _Way
+        self, model: Model, places: Places, radius_px: int, context: Context, ways: int
     ) -> tuple[NDArray[np.int_], Surfaces]:
-        """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1)."""
+        """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1).
+
+        The first way is that of chips of the reference in the input. The second is back, rotated by
+        180° so that it peaks at the same place.
+        """
         reach = radius_px + BORDER_PX
         images = Resampled.by_model(self.pair, model, places.grid, reach, context)
         windows = ChipWindows(images, places, reach, self.held_out)
+
+        def of_chips(chips: Description, search: Description) -> Surface:
+            inner = chips.inner(radius_px)
+            return similarity_surface(inner, search, radius_px, self.settings)
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
             if self.left_of is not None:
@@ -154,7 +159,9 @@ class ChipMatcher:
             pixels = places.chip_px**2
             of_reference = describe(reference, pixels, self.settings, context.memo)
             of_input = describe(input, pixels, self.settings)
-            made = [way(of_reference, of_input, radius_px, self.settings) for way in ways]
+            made = [of_chips(of_reference, of_input)]
+            if ways == 2:
+                made.append(of_chips(of_input, of_reference)[..., ::-1, ::-1])
             return np.stack(made, axis=1)
 
         def can_be_matched(reference: Patch, input: Patch) -> bool:
@@ -164,7 +171,7 @@ class ChipMatcher:
         left_out = np.delete(places.centres, kept, axis=0)
         _log.debug("chips that are not matched lie at %s", left_out.tolist())
         span = 2 * radius_px + 1
-        none = np.zeros((0, len(ways), span, span), np.float32)
+        none = np.zeros((0, ways, span, span), np.float32)
         return places.centres[kept], np.stack(found) if found else none
 
     def _can_be_matched(self, core: Patch) -> bool:
@@ -178,21 +185,6 @@ class ChipMatcher:
             _log.debug("a chip is not matched: it is constant")
             return False
         return True
-
-
-def _forward(
-    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
-) -> Surface:
-    """Return the surfaces of chips of the reference in the input."""
-    return similarity_surface(reference.inner(radius_px), input, radius_px, settings)
-
-
-def _backward(
-    reference: Description, input: Description, radius_px: int, settings: SimilaritySettings
-) -> Surface:
-    """Return the surfaces of chips of the input in the reference, as those of the way forward."""
-    backward = similarity_surface(input.inner(radius_px), reference, radius_px, settings)
-    return backward[..., ::-1, ::-1]
 
 
 def _equal_weight(surfaces: Surfaces) -> FloatArray:
