@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
-from ..rasters.raster_masks import kept_on, mask_span
+from ..rasters.raster_masks import kept_on
 from ..rasters.reading import Mask, RasterSource, Window
+from ..rasters.warping import reduction
 from .scene import Scene, Selection
 
 # What a vector layer is if it shows what takes no part.
@@ -113,7 +114,7 @@ class RasterMask:
         mask = replace(self.mask, bands=bands, has_mask_band=False)
         grid = self.scene.grid
         to_mask = grid.to_pixels_of(mask.grid)
-        span = mask_span(mask, grid, to_mask)
+        span = reduction(grid, to_mask, mask.grid.size)
         kept = kept_on(
             mask, grid.window(*window), to_mask, lambda found: ~self.values.excluded(found), span
         )

@@ -99,7 +99,7 @@ def average_window(
     Parameters
     ----------
     read
-        Returns values and validity of a window of the raster or of a level, (bands, h, w).
+        Returns values and validity of a window of the raster or of a level, ([bands,] h, w).
     source, level
         The raster, and the image of it that is read: itself, or an overview.
     window
@@ -110,7 +110,7 @@ def average_window(
     Returns
     -------
     means, valid
-        Shapes (bands, height, width), as `area_average`.
+        Shapes ([bands,] height, width), as `area_average`.
     """
     top, row_edges = _edges(
         window.row, window.height, shape[0], (source.grid.height, level.grid.height)
@@ -126,11 +126,13 @@ def average_window(
         start, stop = int(np.floor(edges[0])), int(np.ceil(edges[-1]))
         values, valid = read(level, Window(left, top + start, width, stop - start))
         values = values.astype(working_dtype(values.dtype), copy=False)
-        pairs = zip(values, valid, strict=True)
-        strips.append([area_average(v, ok, edges - start, col_edges) for v, ok in pairs])
-    bands = [zip(*band, strict=True) for band in zip(*strips, strict=True)]
-    images = [(np.concatenate(v), np.concatenate(ok)) for v, ok in bands]
-    return np.stack([v for v, _ in images]), np.stack([ok for _, ok in images])
+        images, shown = (part.reshape(-1, *part.shape[-2:]) for part in (values, valid))
+        pairs = zip(images, shown, strict=True)
+        means = [area_average(v, ok, edges - start, col_edges) for v, ok in pairs]
+        strips.append([np.stack(part) for part in zip(*means, strict=True)])
+    found, known = (np.concatenate(part, axis=1) for part in zip(*strips, strict=True))
+    whole = *values.shape[:-2], *shape
+    return found.reshape(whole), known.reshape(whole)
 
 
 def _edges(

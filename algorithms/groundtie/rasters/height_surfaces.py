@@ -161,17 +161,10 @@ def read_heights(
     Voids that nobody declared take no part in means either, so that no overviews are read.
     """
     if out_shape is not None:
-        means, known = average_window(_read_band, source, source, window, out_shape)
-        return means[0], known[0]
+        return average_window(read_heights, source, source, window, out_shape)
     stored, valid = source.read(window, 1)
     values = in_metres(stored, source)
     return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
-
-
-def _read_band(source: RasterSource, window: Window) -> tuple[FloatImage, Mask]:
-    """Return heights and which of them are valid, shapes (1, h, w)."""
-    values, valid = read_heights(source, window)
-    return values[None], valid[None]
 
 
 def surface_around(

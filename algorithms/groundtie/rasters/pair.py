@@ -12,9 +12,9 @@ from ..geometry.limits import SearchLimits
 from .colours import Colours
 from .grid import FloatArray, Grid, PointFunction, finite
 from .patch import Patch, empty_areas
-from .raster_masks import kept_on, mask_span
+from .raster_masks import kept_on
 from .reading import FloatImage, Mask, RasterSource, Window
-from .warping import sample, sample_bands
+from .warping import reduction, sample, sample_bands
 
 # Rotated images are tried at angles this far apart for what they reach.
 _ANGLE_STEP_DEG = 5.0
@@ -98,7 +98,7 @@ class Image:
         coarser levels, whose pixels are as those of matching at their centres.
         """
         to_px = matching.to_pixels_of(self.source.grid)
-        span = mask_span(mask, matching, _to_mask_px(self.source, mask, to_px))
+        span = reduction(matching, _to_mask_px(self.source, mask, to_px), mask.grid.size)
         is_so = mask is self.mask and span == self.mask_span
         return self if is_so else replace(self, mask=mask, mask_span=span)
 

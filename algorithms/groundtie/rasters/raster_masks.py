@@ -9,16 +9,11 @@ import numpy as np
 from .averaging import average_window
 from .grid import Grid, PointFunction
 from .reading import RasterSource
-from .warping import reduction, sample, sample_by
+from .warping import sample, sample_by
 from .windows import FloatImage, Mask, Window
 
 # A larger pixel takes part if so much of it does: all but what interpolation hardly weighs.
 _KEPT_SHARE = 0.99
-
-
-def mask_span(mask: RasterSource, grid: Grid, to_mask_px: PointFunction) -> tuple[int, int]:
-    """Return how many columns and rows of a mask a pixel of a grid spans: see `reduction`."""
-    return reduction(grid, to_mask_px, mask.grid.size)
 
 
 def kept_on(
@@ -41,8 +36,8 @@ def kept_on(
     keeps
         Returns which of the mask's values take part; pixels without data never do.
     span
-        Columns and rows of the mask that must take part together, as `mask_span`; (1, 1): the
-        nearest pixel decides.
+        Columns and rows of the mask that must take part together, as `reduction` has them; (1, 1):
+        the nearest pixel decides.
     """
     if span == (1, 1):
         values, known = sample(mask, grid, to_mask_px, "nearest", 1)
@@ -50,11 +45,10 @@ def kept_on(
 
     def kept(source: RasterSource, part: Window) -> tuple[FloatImage, Mask]:
         values, known = source.read(part, 1)
-        return (known & keeps(values)).astype(np.float32)[None], _inside(source, part)[None]
+        return (known & keeps(values)).astype(np.float32), _inside(source, part)
 
     def shares(part: Window, shape: tuple[int, int] | None) -> tuple[FloatImage, Mask]:
-        found = kept(mask, part) if shape is None else average_window(kept, mask, mask, part, shape)
-        return found[0][0], found[1][0]
+        return kept(mask, part) if shape is None else average_window(kept, mask, mask, part, shape)
 
     share, inside = sample_by(mask, grid, to_mask_px, "bilinear", shares, span)
     return inside & (share >= _KEPT_SHARE)

@@ -174,9 +174,8 @@ class RasterSource:
             if self.is_complex:
                 values = np.abs(values)
             if len(bands) == 1:
-                return values.astype(np.float32), valid
-            everywhere: Mask = np.asarray(valid.all(axis=0, keepdims=True))
-            return values.mean(axis=0, keepdims=True, dtype=np.float32), everywhere
+                return values[0].astype(np.float32), valid[0]
+            return values.mean(axis=0, dtype=np.float32), np.asarray(valid.all(axis=0))
 
         if out_shape is None:
             values, valid = grey(self, window)
@@ -186,8 +185,7 @@ class RasterSource:
                 reduction = min(window.height / out_shape[0], window.width / out_shape[1])
                 level = self._overviews.coarsest(self, reduction)
             values, valid = average_window(grey, self, level, window, out_shape)
-        grey_values = np.where(valid[0], values[0], np.float32(0)).astype(np.float32)
-        return grey_values, valid[0]
+        return np.where(valid, values, np.float32(0)).astype(np.float32), valid
 
     def read_bands(
         self,
