@@ -17,7 +17,6 @@ from toys import TOY, run_tools
 import groundtie
 from groundtie import memory
 from groundtie.errors import MemoryLimitError, ParameterError
-from groundtie.rasters.reading import bounded_cache
 
 PACKAGE = Path(__file__).resolve().parents[1] / "algorithms"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(PACKAGE)}
@@ -32,12 +31,13 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         Path(name).touch()
 
 
-def test_gdal_and_the_dates_of_a_series_get_shares_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gdal_gets_a_share_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(memory.VARIABLE, raising=False)
-    assert (memory.cache_bytes(), memory.dates_bytes()) == (200_000_000, 400_000_000)
+    with memory.bounded_cache():
+        assert rasterio.env.getenv()["GDAL_CACHEMAX"] == 200_000_000
     monkeypatch.setenv(memory.VARIABLE, "250")
-    assert (memory.cache_bytes(), memory.dates_bytes()) == (50_000_000, 100_000_000)
-    with bounded_cache():
+    assert memory.share_bytes(memory.DATES_SHARE) == 100_000_000
+    with memory.bounded_cache():
         assert rasterio.env.getenv()["GDAL_CACHEMAX"] == 50_000_000
 
 

@@ -12,6 +12,7 @@ import inspect
 import operator
 import typing
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -19,7 +20,8 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import Kind, RasterIn, WrittenKind
+from .kinds import Kind, RasterIn, RastersIn, WrittenKind
+from .memory import bounded_cache
 from .runs import run_of_call, running
 
 
@@ -208,8 +210,12 @@ def tool(
             through = {key: bound.pop(key) for key in HANDED_THROUGH if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}
+            rasters = any(isinstance(p.kind, (RasterIn, RastersIn)) for p in declared.parameters)
             try:
-                with running(declared.run_of_call(values)):
+                with (
+                    running(declared.run_of_call(values)),
+                    bounded_cache() if rasters else nullcontext(),
+                ):
                     return cast(Callable[..., R], function)(**values, **given, **through)
             except MemoryError as error:
                 raise MemoryLimitError(f"memory does not suffice: {error}") from error

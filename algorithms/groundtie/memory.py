@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import os
 import sys
+from typing import Any
 
 from .errors import MemoryLimitError, ParameterError
 
@@ -24,11 +25,11 @@ DEFAULT_MB, LEAST_MB, MOST_MB = 1000, 100, 1_000_000
 _CACHE_SHARE = 0.2
 
 # For the dates of a series, which are matched again and again.
-_DATES_SHARE = 0.4
+DATES_SHARE = 0.4
 
 # For what chips of its reference are described by, which is the same for every date: 111 MB in the
 # timed series of the suite series, of 560² pixels.
-_DESCRIBED_SHARE = 0.15
+DESCRIBED_SHARE = 0.15
 
 # What glibc's `mallopt` calls its options, and what they are set to. Threads share two heaps: there
 # are eight for each processor else, of which each keeps what its threads have given back, 110 MB
@@ -59,19 +60,19 @@ def budget_bytes() -> int:
     return round(megabytes * 1e6)
 
 
-def cache_bytes() -> int:
-    """Return how much GDAL may keep of what it has read."""
-    return round(_CACHE_SHARE * budget_bytes())
+def share_bytes(share: float) -> int:
+    """Return how much a share of the budget is."""
+    return round(share * budget_bytes())
 
 
-def dates_bytes() -> int:
-    """Return how much the dates of a series may take."""
-    return round(_DATES_SHARE * budget_bytes())
+def bounded_cache() -> Any:
+    """Return the environment in which GDAL keeps a bounded amount of what it has read.
 
+    Of itself it is a twentieth of the machine's memory. Tools that take rasters run in it.
+    """
+    import rasterio  # not for the command line's help
 
-def described_bytes() -> int:
-    """Return how much the descriptions of its reference's chips may take."""
-    return round(_DESCRIBED_SHARE * budget_bytes())
+    return rasterio.Env(GDAL_CACHEMAX=share_bytes(_CACHE_SHARE))
 
 
 def require_bytes(needed: float, what: str) -> None:

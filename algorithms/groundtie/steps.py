@@ -26,8 +26,9 @@ from .geometry.tie_points import TiePoints
 from .geometry.transform import Transform, as_positions
 from .kinds import Choice, Number
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
+from .memory import bounded_cache
 from .rasters.patch import Patch
-from .rasters.reading import bounded_cache, open_raster
+from .rasters.reading import open_raster
 from .registration.opening import open_pair
 from .registration.pipeline import judge_estimate, mask_pair
 from .registration.scene import SceneInfo

@@ -136,7 +136,7 @@ def test_a_virtual_raster_of_another_source_is_another_date(
 def test_a_truncated_date_is_left_out_alone_whether_held_or_not(
     tmp_path: Path, one_thread: Context, monkeypatch: pytest.MonkeyPatch, most_bytes: int
 ) -> None:
-    monkeypatch.setattr(dates, "dates_bytes", lambda: most_bytes)
+    monkeypatch.setattr(dates, "share_bytes", lambda share: most_bytes)
     paths = [
         write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
         for name in "abc"

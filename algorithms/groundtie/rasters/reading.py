@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import rasterio
 import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, MaskFlags
@@ -17,7 +16,6 @@ from rasterio.errors import NotGeoreferencedWarning
 
 from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
-from ..memory import cache_bytes
 from ..raster_names import is_remote, raster_name
 from .averaging import average_window
 from .grid import PIXEL_COORDINATES, Grid
@@ -313,11 +311,3 @@ def _masks_differ(raster: Raster) -> bool:
         return False
     first, *others = np.ma.getmaskarray(raster.bands)
     return any((mask != first).any() for mask in others)
-
-
-def bounded_cache() -> Any:
-    """Return the environment in which GDAL keeps a bounded amount of what it has read.
-
-    Of itself it is a twentieth of the machine's memory.
-    """
-    return rasterio.Env(GDAL_CACHEMAX=cache_bytes())

@@ -16,7 +16,7 @@ from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import AUTO
 from ..progress import SILENT, Progress
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..sensor.rpc_files import rpc_of
 from ..sensor.rpc_fit import RPCFit
 from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, asked_terrain
@@ -127,7 +127,7 @@ def register_anything(
     if _needs_rpcs(parameters["input"]):
         return _by_rpcs(parameters, progress)
     call = Call.of(parameters, progress)
-    with bounded_cache(), threads(parameters["workers"], progress) as context:
+    with threads(parameters["workers"], progress) as context:
         asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}
         ways = tuple(plan_rendered(parameters))
         if parameters["views"] is not None and not ways:

@@ -15,7 +15,6 @@ from ..geometry.tie_point_files import write_tie_points
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.grid import Grid
-from ..rasters.reading import bounded_cache
 from ..report.stac import quality_of, stac_item
 from .asked import USUAL, asked_masks, specified
 from .displacement import write_displacement
@@ -199,9 +198,7 @@ class Call:
         """
         with stack:
             registration = replace(registration, beyond=self.files.beyond(registration))
-            # Not for as long as the rasters: environments must be left in the order of entering.
-            with bounded_cache():
-                self.files.write(registration, context)
+            self.files.write(registration, context)
             registration.require_accepted()
             rasters = stack.pop_all()
         kept = replace(registration, files=self.files.named(registration), rasters=rasters)

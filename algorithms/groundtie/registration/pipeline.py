@@ -19,7 +19,6 @@ from ..geometry.transform import Transform
 from ..masks.used import NONE, MaskUsed
 from ..matching.check import Check
 from ..matching.surface_fit import FIT_RADIUS_PX
-from ..rasters.reading import bounded_cache
 from .evidence import Agreement, ImagesEvidence, RegistrationEvidence
 from .masks import Masked, ground_instead, with_ground_mask
 from .opening import OpenPair
@@ -47,11 +46,10 @@ def run(
     scene
         What the images are, if that was found before.
     """
-    with bounded_cache():
-        scene = scene or SceneInfo.of(opened.pair, spec.radar)
-        context.update(0.02, "inspecting the images")
-        masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
-        return register(opened, masked, spec, context.part(0.12, 1.0))
+    scene = scene or SceneInfo.of(opened.pair, spec.radar)
+    context.update(0.02, "inspecting the images")
+    masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
+    return register(opened, masked, spec, context.part(0.12, 1.0))
 
 
 def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:

@@ -15,7 +15,7 @@ from ..geometry.accuracy import NOTHING_COMMON
 from ..masks.used import MaskUsed
 from ..progress import Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.height_check import HeightCheck
@@ -159,7 +159,6 @@ def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpRes
     """
     output = parameters["output"]
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context)
         assert found is not None
         points = found.accepted()
@@ -193,7 +192,6 @@ def refine_into(
     if (parameters["reference"] is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         sensor, found = _matched(parameters, stack, context.part(0.0, 0.9))
         if found is None:
             points = read_control_points(

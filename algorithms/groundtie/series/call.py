@@ -17,7 +17,6 @@ from ..executors import open_executor
 from ..geometry.transform import Transform
 from ..progress import Progress
 from ..raster_names import identity
-from ..rasters.reading import bounded_cache
 from ..registration.evidence import DateEvidence
 from ..registration.registered_output import model_for_grid
 from ..registration.user_masks import UserMask
@@ -100,7 +99,6 @@ class SeriesCall:
         with threads(given["workers"], progress) as context, ExitStack() as stack:
             if executor is None and given["scheduler"] is not None:
                 executor = stack.enter_context(open_executor(1, given["scheduler"]))
-            stack.enter_context(bounded_cache())
             opened = open_dates(self.listed, given["band"], stack, context.part(0.0, 0.05))
             dates, failures = _on_one_map(*opened, self.reference)
             try:

@@ -19,7 +19,7 @@ from shapely.ops import unary_union
 from ..context import Context
 from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
-from ..memory import dates_bytes
+from ..memory import DATES_SHARE, share_bytes
 from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
@@ -176,7 +176,7 @@ def open_dates(
     """
     dates: list[Date] = []
     failures: dict[str, str] = {}
-    held_bytes, most_bytes = 0, dates_bytes()
+    held_bytes, most_bytes = 0, share_bytes(DATES_SHARE)
     for number, one in enumerate(listed):
         context.update(number / len(listed), f"opening {one.name}")
         try:

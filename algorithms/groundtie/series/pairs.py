@@ -25,8 +25,8 @@ from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
 from ..kinds import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
+from ..memory import bounded_cache
 from ..rasters.grid import Grid, reproject
-from ..rasters.reading import bounded_cache
 from ..registration.opening import pair_images
 from ..registration.pipeline import run
 from ..registration.registration import Registration

@@ -13,7 +13,7 @@ from ..context import Context
 from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
 from ..memo import Memo
-from ..memory import described_bytes
+from ..memory import DESCRIBED_SHARE, share_bytes
 from .closure import triplet_closures
 from .dates import Date
 from .frame import PARAMETERS, FloatArray, SeriesFrame
@@ -92,7 +92,7 @@ class Matching:
 
     def from_hub(self, hub: int) -> None:
         """Register all dates to one, reach the others by their neighbours, and close loops."""
-        self.described = Memo(described_bytes())
+        self.described = Memo(share_bytes(DESCRIBED_SHARE))
         others = [date for date in range(len(self.dates)) if date != hub]
         self._attempt_all([(hub, date) for date in others], hub)
         self._reach(others, hub)

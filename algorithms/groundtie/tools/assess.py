@@ -20,7 +20,7 @@ from ..geometry.transform import Transform
 from ..kinds import Choice, FileIn, Number, RasterIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..registration.verdict import Verdict
 from ..report.assessment_report import PART_LABELS, AssessmentReport
 from .parameters import general
@@ -216,7 +216,6 @@ def assess(
     files.check(images, max_error, report is not None)
     comparison: Comparison | None = None
     with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         right, moving = (
             None if path is None else stack.enter_context(open_raster(path))
             for path in images.values()

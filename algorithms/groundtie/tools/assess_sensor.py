@@ -14,7 +14,6 @@ from ..geometry.tie_points import NONE_HELD_OUT
 from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache
 from ..registration.sensor_input import Ground, open_oriented_image, open_sensor_image
 from ..sensor.control_points import READ_SUFFIXES, read_control_points
 from ..sensor.rpc import RPC
@@ -101,7 +100,6 @@ def assess_sensor(
     """
     ground = Ground(dem, dem_datum, geoid, height)
     with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         oriented = open_oriented_image(image, rpc, ground, None, stack, progress)
         points = read_control_points(
             check_points, oriented.orientation, oriented.source.grid, oriented.source.path

@@ -16,7 +16,6 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_csv, write_json
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
-from ..rasters.reading import bounded_cache
 from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..registration.stored_transform import transform_of
@@ -159,7 +158,6 @@ def detector_repeatability(
     bands, masks = (reference_band, input_band), (reference_mask, input_mask)
     with (
         threads(progress=progress) as context,
-        bounded_cache(),
         open_pair(reference, input, spec, context.part(0.0, 0.1), bands, masks) as opened,
     ):
         pair = opened.images

@@ -18,7 +18,7 @@ from ..pose.rotation_windows import PoseWindows, read_windows
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..registration.pose_verdict import PoseEvidence, confirm_pose, judge_pose
 from ..registration.verdict import Verdict
 from ..report.rotation_picture import draw_rotation
@@ -189,7 +189,6 @@ def estimate_rotation(
     with (
         threads(workers, progress) as context,
         Outputs() as outputs,
-        bounded_cache(),
         ExitStack() as opened,
     ):
         context.update(0.0, "reading")

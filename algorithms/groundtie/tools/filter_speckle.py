@@ -12,7 +12,7 @@ from ..errors import ParameterError
 from ..kinds import Choice, Number, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..speckle.filters import FILTERS, SpeckleFilter
 from ..speckle.raster_filter import AMPLITUDE, VALUES, RasterFilter, looks_of
 from .parameters import general
@@ -109,7 +109,7 @@ def filter_speckle(
     """
     if window % 2 == 0:
         raise ParameterError(f"window must be an odd number, not {window}")
-    with bounded_cache(), open_raster(input) as source, threads(workers, progress) as context:
+    with open_raster(input) as source, threads(workers, progress) as context:
         if looks is None:
             looks = looks_of(source, values)
         job = RasterFilter(source, SpeckleFilter(filter, window, looks, damping), values)

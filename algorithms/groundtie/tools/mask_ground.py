@@ -7,7 +7,7 @@ from ..masks.ground import find_ground
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from .parameters import general
 from .results import SHARE_OUTPUT, WrittenMask
 
@@ -25,7 +25,7 @@ def mask_ground(
     the layover of the next. The mask is for the registration of this image; `coregister` makes
     the same one itself of a town.
     """
-    with bounded_cache(), open_raster(input) as source:
+    with open_raster(input) as source:
         scene = Scene.of(source, band)
         ground = find_ground(scene, progress.part(0.0, 0.7))
         with Outputs() as outputs:

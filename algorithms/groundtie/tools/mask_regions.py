@@ -11,7 +11,7 @@ from ..masks.regions import HIGH_PERCENT, WIDTH_M, find_regions
 from ..masks.scene import Scene, write_mask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from .parameters import general
 from .results import SHARE_OUTPUT, WrittenMask
 
@@ -50,7 +50,7 @@ def mask_regions(
     window; strong scatterers inside are masked. The mask is for the registration of this image.
     """
     files = given_files({"mask": output, "regions": regions, "skeleton": skeleton})
-    with bounded_cache(), open_raster(input) as source:
+    with open_raster(input) as source:
         scene = Scene.of(source, band)
         found = find_regions(scene, mask_width, mask_high_percent, progress.part(0.0, 0.7))
         with Outputs() as outputs:

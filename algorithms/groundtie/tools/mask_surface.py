@@ -14,7 +14,7 @@ from ..kinds import RasterOut
 from ..masks.scene import Scene, write_mask, write_tiles
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..registration.specification import StatedSurface
 from ..registration.surface_masks import fitted_ground
 from .parameters import general, registration
@@ -58,7 +58,7 @@ def mask_surface(
         )
     known = (view,) if other is None else (view, stated_view(other))
     files = given_files({"mask": output, "reasons": reasons})
-    with bounded_cache(), ExitStack() as stack:
+    with ExitStack() as stack:
         scene = Scene.of(stack.enter_context(open_raster(reference)))
         ground, fit = fitted_ground(scene, StatedSurface(surface_model, known), stack)
         with Outputs() as outputs:

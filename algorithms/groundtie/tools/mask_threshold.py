@@ -9,7 +9,7 @@ from ..masks.scene import Scene, write_mask
 from ..masks.threshold import HIGH_PERCENT, ThresholdMask
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from .parameters import general
 from .results import SHARE_OUTPUT, WrittenMask
 
@@ -29,7 +29,7 @@ def mask_threshold(
     The thresholds are percentiles of the means over blocks of 4 × 4 pixels; whole blocks take
     part or do not. The mask is for the registration of this image.
     """
-    with bounded_cache(), open_raster(input) as source:
+    with open_raster(input) as source:
         scene = Scene.of(source, band)
         grow_px = round(mask_growth / source.grid.pixel_size_m)
         searching = progress.part(0.0, 0.3)

@@ -17,7 +17,7 @@ from ..kinds import Crs, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.grid import require_map
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..registration.orthorectification import write_orthoimage
 from ..registration.sensor_input import Ground, open_sensor_image
 from .parameters import general, sensor
@@ -87,7 +87,6 @@ def orthorectify(
         raise ParameterError("give either a reference, which has CRS and pixel size, or these")
     ground = Ground(dem, dem_datum, geoid, height, dem_cover / 100)
     with threads(workers, progress) as context, ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         source, model = open_sensor_image(image, rpc, stack)
         grid = None
         if reference is not None:

@@ -9,7 +9,6 @@ from ..context import threads
 from ..declaration import Output, tool
 from ..kinds import Choice, Distance, FileOut, Number, RasterOut
 from ..progress import SILENT, Progress
-from ..rasters.reading import bounded_cache
 from ..registration.opening import open_pair
 from ..registration.specification import Specification
 from ..similarity.binning import BINNINGS
@@ -169,7 +168,6 @@ def similarity_surface(
     bands, masks = (reference_band, input_band), (reference_mask, input_mask)
     with (
         threads(workers, progress.part(0.0, 0.9), seed) as context,
-        bounded_cache(),
         open_pair(reference, input, spec, context, bands, masks) as opened,
     ):
         window = Window.at(opened.pair, (centre_x, centre_y), chip_size, search_radius)

@@ -20,7 +20,7 @@ from ..kinds import Band, Choice, FileOut, RasterIn, Text, VectorIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.pair import Image
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from .parameters import general
 
 # Weaker features than those that are matched are labelled, too: as many as there may be.
@@ -136,7 +136,6 @@ def train_feature_classifier(
     if not values:
         raise ParameterError("left_out names no value")
     with ExitStack() as stack:
-        stack.enter_context(bounded_cache())
         image = Image(stack.enter_context(open_raster(input)), band)
         source: LabelSource
         if labels is not None:

@@ -15,7 +15,7 @@ from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..rasters.grid import Grid, require_both_or_none
-from ..rasters.reading import bounded_cache, open_raster
+from ..rasters.reading import open_raster
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..rasters.vrt import SUFFIX as VRT
 from ..registration.registered_output import REFERENCE_GRID, RegisteredOutput
@@ -91,7 +91,7 @@ def warp(
         raise ParameterError("a .vrt has the input's own pixels: no reference and no pixel size")
     if reference is not None and pixel_size is not None:
         raise ParameterError("give either a reference, which has a pixel size, or a pixel size")
-    with bounded_cache(), open_raster(input) as source:
+    with open_raster(input) as source:
         found, fit = load_stored(transform, model, source)
         found = transform_of(found, source, transform)
         # A .vrt has but the pixels of the input.
