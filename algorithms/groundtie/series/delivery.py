@@ -23,7 +23,7 @@ from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
 from .frame import FloatArray, sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
-from .stored import SERIES_JSON, StoredSeries, forget_unfinished, state_of
+from .stored import SERIES_JSON, StoredDate, StoredSeries, forget_unfinished, state_of
 
 TABLE_CSV, TABLE_GPKG = "series.csv", "series.gpkg"
 
@@ -95,11 +95,11 @@ class SeriesFiles:
                 verdict = replace(one.verdict, reason=f"{one.verdict.reason}; no raster: {error}")
                 one, made = replace(one, verdict=verdict), None
             if made is not None:
-                one, known, grid = made
+                one, raster, grid = made
                 beyond = series.beyond_overlap(one, self.output_grid)
                 share = None if beyond is None else beyond.share
-                written[one.name] = {**known, "outside_of_overlap": share}
-                items.append(self._item(one, series, written[one.name]["file"], grid))
+                written[one.name] = replace(raster, outside_of_overlap=share)
+                items.append(self._item(one, series, raster.file, grid))
             dates.append(one)
         files = {"output_folder": self.folder}
         if self.report is not None:
@@ -114,8 +114,8 @@ class SeriesFiles:
         stored: StoredSeries,
         outputs: Outputs,
         context: Context,
-    ) -> tuple[SeriesDate, dict[str, Any], Grid] | None:
-        """Return a date, what is known of its raster, and its grid; None: it is not registered."""
+    ) -> tuple[SeriesDate, StoredDate, Grid] | None:
+        """Return a date, its raster, and the grid of that; None: it is not registered."""
         if not one.is_registered:
             return None
         assert one.date is not None and one.transform is not None
@@ -126,15 +126,15 @@ class SeriesFiles:
             # What untouched pixels may be wrong by, too.
             if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
                 has_written(self.folder / before.file)
-                known = _known(before.file, key, before.run, before.state)
                 with open_raster(self.folder / before.file) as source:
-                    return replace(one, transform=before.transform), known, source.grid
+                    return replace(one, transform=before.transform), before, source.grid
         context.update(0.0, f"writing {one.name}")
         path = self.folder / f"{one.name}_registered.cog.tif"
         output = RegisteredOutput(path, self.output_grid, self.resampling)
         grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
         state = state_of(outputs.staged(path))
-        return one, _known(path.name, key, run_tags().get(RUN), state), grid
+        made = StoredDate(path.name, key, run_tags().get(RUN), state, one.transform)
+        return one, made, grid
 
     def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
         """Return the STAC item of a registered date; empty where there can be none."""
@@ -163,7 +163,7 @@ class SeriesFiles:
 
     def _remove_stale(self, series: Series, stored: StoredSeries) -> None:
         """Remove rasters of dates that are left out now: they must not seem to be registered."""
-        current = {one["file"] for one in series.written.values()}
+        current = {one.file for one in series.written.values()}
         for one in stored.dates.values():
             if one.file not in current and one.is_own(self.folder):
                 with writing(self.folder / one.file):
@@ -176,11 +176,6 @@ class SeriesFiles:
             for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
                 with writing(self.folder / name):
                     (self.folder / name).unlink(missing_ok=True)
-
-
-def _known(file: str, key: str, run: str | None, state: str | None) -> dict[str, Any]:
-    """Return what the next run reads of a raster (see `StoredDate`)."""
-    return {"file": file, "key": key, "run": run, "state": state}
 
 
 def _write_layer(path: Path, series: Series) -> None:

@@ -21,7 +21,7 @@ from .frame import FloatArray, SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
 from .pairs import PairResult
 from .settling import DateVerdict, Settled
-from .stored import FORMAT
+from .stored import FORMAT, StoredDate
 
 TABLE_COLUMNS = {
     "name": "str",
@@ -79,7 +79,7 @@ class SeriesDate:
         """Whether it was registered: it is neither left out, nor the reference, nor alone."""
         return self.verdict.accepted and not self.is_reference and self.verdict.evidence.links > 0
 
-    def row(self, frame: SeriesFrame, written: Mapping[str, Any]) -> dict[str, Any]:
+    def row(self, frame: SeriesFrame, written: StoredDate | None) -> dict[str, Any]:
         """Return the date's row of the table; shifts are where its ground nominally lies.
 
         Parameters
@@ -87,7 +87,7 @@ class SeriesDate:
         frame
             The series' frame.
         written
-            What is known of its raster (see `Series.written`); empty: there is none.
+            Its raster; None: there is none.
         """
         verdict, evidence = self.verdict, self.verdict.evidence
         values: dict[str, Any] = dict.fromkeys(TABLE_COLUMNS)
@@ -98,13 +98,13 @@ class SeriesDate:
             "state": "reference" if self.is_reference else state,
             "rule": verdict.rule,
             "reason": "all dates are registered to it" if self.is_reference else verdict.reason,
-            "file": written.get("file"),
+            "file": None if written is None else written.file,
             "links": evidence.links,
             "loops": evidence.loops,
             "open_loops": evidence.open_loops,
             "worst_loop_px": verdict.worst_loop_px,
             "confirmed": evidence.is_confirmed,
-            "outside_of_overlap": written.get("outside_of_overlap"),
+            "outside_of_overlap": None if written is None else written.outside_of_overlap,
         }
         displacement, covariance = verdict.displacement, verdict.covariance
         if displacement is None or covariance is None:
@@ -150,7 +150,7 @@ class Series:
     seconds
         How long it took.
     written
-        What is known of each raster that was written, by the names of the dates.
+        The rasters that were written, by the names of the dates.
     items
         STAC items of these rasters.
     files
@@ -169,7 +169,7 @@ class Series:
     reused_pairs: int
     parameters: Mapping[str, Any]
     seconds: float = 0.0
-    written: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    written: Mapping[str, StoredDate] = field(default_factory=dict)
     items: tuple[Mapping[str, Any], ...] = ()
     files: Mapping[str, Path] = field(default_factory=dict)
 
@@ -189,7 +189,7 @@ class Series:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table, one row a date (see `TABLE_COLUMNS`)."""
-        return [date.row(self.frame, self.written.get(date.name, {})) for date in self.dates]
+        return [date.row(self.frame, self.written.get(date.name)) for date in self.dates]
 
     def beyond_overlap(self, date: SeriesDate, grid: str) -> BeyondOverlap | None:
         """Return what of a registered date lies where no date is that it was registered with.
@@ -222,7 +222,7 @@ class Series:
 
     def beyond_line(self) -> str:
         """Return what of the dates nothing has checked as a line of text; empty: nothing."""
-        shares = {name: one["outside_of_overlap"] or 0.0 for name, one in self.written.items()}
+        shares = {name: one.outside_of_overlap or 0.0 for name, one in self.written.items()}
         name = max(shares, key=lambda name: shares[name], default="")
         if not shares.get(name):
             return ""
@@ -283,9 +283,9 @@ class Series:
         """
         values = self.summary()
         for row, date in zip(values["dates"], self.dates, strict=True):
-            transform = date.transform
+            transform, written = date.transform, self.written.get(date.name)
             row["transform"] = None if transform is None else transform.to_json()
-            row["written"] = self.written.get(date.name)
+            row["written"] = None if written is None else written.to_json()
             row["mask"] = None if date.listed.mask is None else date.listed.mask.summary()
             covariance = date.verdict.covariance
             row["covariance_px2"] = None if covariance is None else covariance.tolist()

@@ -31,7 +31,7 @@ SERIES_JSON, UNFINISHED = "series.json", "series.unfinished.jsonl"
 
 @dataclass(frozen=True)
 class StoredDate:
-    """A registered raster that an earlier run wrote.
+    """A registered raster that a run wrote, and what the next one needs to know of it.
 
     Parameters
     ----------
@@ -42,9 +42,11 @@ class StoredDate:
     run
         The id of the call that wrote it (see `runs`).
     state
-        Stands for its size and time as it was written (see `state_of`); None: not known.
+        Stands for its size and time as it was written (see `state_of`).
     transform
         By which it was made.
+    outside_of_overlap
+        Share of it that lies where no other date is; None: nothing, or not known yet.
     """
 
     file: str
@@ -52,6 +54,11 @@ class StoredDate:
     run: str | None
     state: str | None
     transform: Transform
+    outside_of_overlap: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all but the transform as values that JSON can carry."""
+        return {name: value for name, value in vars(self).items() if name != "transform"}
 
     def is_untouched(self, folder: Path) -> bool:
         """Return whether the file is there, as that call left it."""
@@ -186,6 +193,6 @@ def _stored_date(values: dict[str, Any]) -> StoredDate:
         str(values["file"]),
         str(written["key"]),
         written["run"],
-        written.get("state"),  # earlier versions did not keep it
+        written["state"],
         Transform.from_json(values["transform"]),
     )
