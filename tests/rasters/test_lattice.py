@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
-from groundtie.rasters.lattice import Lattice, fine_lattice, row_strips
+from groundtie.rasters.lattice import Lattice, lattice, row_strips
 
 
 def plane(width: int, height: int) -> Grid:
@@ -43,7 +43,7 @@ def test_values_are_right_everywhere(
 ) -> None:
     assert callable(function)
     grid = plane(*size)
-    found = everywhere(fine_lattice(grid, function, tolerance))
+    found = everywhere(lattice(grid, function, tolerance))
     expected = function(pixels(grid)).T.reshape(found.shape)
     # Halfway between nodes, where they are looked at, errors of smooth functions are largest.
     assert np.abs(found - expected).max() < 1.1 * tolerance
@@ -57,7 +57,7 @@ def test_straight_functions_are_asked_at_few_places() -> None:
         return xy @ [[1, 2], [-3, 4]]
 
     grid = Grid(Affine(0.5, 0, 1000, 0, -0.5, 2000), None, 512, 512)
-    found = everywhere(fine_lattice(grid, straight, 1e-6))
+    found = everywhere(lattice(grid, straight, 1e-6))
     np.testing.assert_allclose(found.reshape(2, -1).T, straight(pixels(grid)), rtol=1e-12)
     assert len(asked) == 2 and asked[0] < 400
 
@@ -65,7 +65,7 @@ def test_straight_functions_are_asked_at_few_places() -> None:
 @pytest.mark.parametrize("edge", [40.0, 99.5, -1.0])
 def test_what_is_not_known_spoils_nothing_else(edge: float) -> None:
     grid = plane(100, 80)
-    nodes = fine_lattice(grid, lambda xy: np.where(xy[:, :1] < edge, xy, np.nan), 1e-3)
+    nodes = lattice(grid, lambda xy: np.where(xy[:, :1] < edge, xy, np.nan), 1e-3)
     found = everywhere(nodes)
     known = pixels(grid)[:, 0].reshape(80, 100) < edge
     np.testing.assert_array_equal(np.isfinite(found[0]), known)
@@ -74,7 +74,7 @@ def test_what_is_not_known_spoils_nothing_else(edge: float) -> None:
 
 def test_single_precision_serves_for_what_is_left() -> None:
     grid = plane(300, 200)
-    nodes = fine_lattice(grid, lambda xy: xy + 4e6, 1e-3)
+    nodes = lattice(grid, lambda xy: xy + 4e6, 1e-3)
     left = nodes.minus(np.array([4e6, 4e6]))
     assert left.lines(slice(0, 20)).dtype == np.float32
     np.testing.assert_allclose(everywhere(left).reshape(2, -1).T, pixels(grid), atol=1e-4)
@@ -88,7 +88,7 @@ def test_bounds_are_those_of_the_pixels(width: int, height: int, seed: int) -> N
     def bilinear(xy: np.ndarray) -> np.ndarray:
         return (a * xy[:, :1] + b * xy[:, 1:]) + c * xy[:, :1] * xy[:, 1:] / 100
 
-    nodes = fine_lattice(plane(width, height), bilinear, 1e-3)
+    nodes = lattice(plane(width, height), bilinear, 1e-3)
     found = everywhere(nodes)
     np.testing.assert_allclose(nodes.bounds().ravel(), [found.min(), found.max()], atol=1e-9)
 

@@ -133,29 +133,11 @@ class Lattice:
         return np.where(share > 0, mixed, values[:, above])
 
 
-def lattice(grid: Grid, to_input_px: PointFunction) -> Lattice:
-    """Return input positions at a lattice of pixels, fine enough to interpolate between.
-
-    Parameters
-    ----------
-    grid
-        The pixels in question.
-    to_input_px
-        Takes map positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
-        Positions that are not finite become NaN.
-    """
-
-    def finite(xy: FloatArray) -> FloatArray:
-        px = np.asarray(to_input_px(xy), float)
-        return np.where(np.isfinite(px), px, np.nan)
-
-    return fine_lattice(grid, finite, _TOLERANCE_PX)
-
-
 def coordinates(grid: Grid, to_input_px: PointFunction) -> FloatArray:
     """Return the input column and row of every pixel of a grid, shape (2, height, width).
 
-    Good to 0.01 px; positions that are not finite become far outside. Parameters as `lattice`.
+    Good to 0.01 px; positions that are not finite become far outside. `to_input_px` takes map
+    positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
     """
     if isinstance(to_input_px, DenseMap):
         return to_input_px.coordinates(grid)
@@ -169,7 +151,7 @@ def row_strips(height: int, width: int) -> Iterator[slice]:
         yield slice(first, min(first + lines, height))
 
 
-def fine_lattice(grid: Grid, function: PointFunction, tolerance: float) -> Lattice:
+def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_PX) -> Lattice:
     """Evaluate a function at a lattice that is halved until it is right halfway between nodes.
 
     Parameters
@@ -177,7 +159,8 @@ def fine_lattice(grid: Grid, function: PointFunction, tolerance: float) -> Latti
     grid
         The pixels.
     function
-        Smooth; NaN where it has no value. It is asked up to a cell beyond the grid.
+        Smooth; mostly it takes map positions to input pixels, shapes (n, 2). Values that are not
+        finite become NaN. It is asked up to a cell beyond the grid.
     tolerance
         Largest error.
     """
@@ -205,4 +188,5 @@ def _evaluate(grid: Grid, function: PointFunction, step: int, parts: int) -> Flo
         for side in (grid.height, grid.width)
     )
     px = mesh(cols, rows)
-    return function(grid.pixel_to_map(px)).T.reshape(-1, len(rows), len(cols))
+    values = np.asarray(function(grid.pixel_to_map(px)), float).T
+    return np.where(np.isfinite(values), values, np.nan).reshape(-1, len(rows), len(cols))

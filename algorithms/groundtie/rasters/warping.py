@@ -187,7 +187,7 @@ def sample(
     source, band
         The raster and its band, from 1; None takes the mean of all bands but alpha.
     grid, to_input_px
-        As in `lattice`.
+        As in `lattice.coordinates`.
     method
         One of `METHODS`.
 

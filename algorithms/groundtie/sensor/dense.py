@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rasters.grid import POSITION_ERROR_PX, FloatArray, Grid, PointFunction, mesh
-from ..rasters.lattice import NOWHERE, Lattice, fine_lattice, row_strips
+from ..rasters.lattice import NOWHERE, Lattice, lattice, row_strips
 from ..rasters.reading import FloatImage
 from .orientation import Orientation
 
@@ -40,7 +40,7 @@ class DenseOrientation:
         px = np.empty((2, grid.height, grid.width))
 
         def on_nodes(function: PointFunction, tolerance: float) -> Lattice:
-            return fine_lattice(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
+            return lattice(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
 
         heights = orientation.heights.on_grid(grid, on_nodes)
         if heights is None:
