@@ -143,7 +143,7 @@ def _covered(grid: Grid, transform: Transform) -> Grid:
 def _places(grid: Grid) -> Places:
     """Return chips side by side on a grid, reduced if it is large."""
     factor = level_factor(grid)
-    level = grid if factor == 1 else grid.scaled(factor)
+    level = grid.scaled(factor)
     chip = max(min(level.size) // _ALONG, 1)
     return Places.spread(level, chip, lambda side: side // chip)
 

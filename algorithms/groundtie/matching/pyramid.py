@@ -74,7 +74,7 @@ def find_coarse_model(
     """
     grid = matcher.pair.grid
     factor = level_factor(grid)
-    level = grid if factor == 1 else grid.scaled(factor)
+    level = grid.scaled(factor)
     pair = matcher.pair
     if limits.is_shift:  # others look at larger and smaller pixels, too
         pair = held_on_level(pair, level, context.quiet())
@@ -94,7 +94,7 @@ def _descend(
 ) -> Model:
     """Return the model that chips agree on, level by level; the coarsest has its own matcher."""
     grid, quiet = matcher.pair.grid, context.quiet()
-    level = grid if factor == 1 else grid.scaled(factor)
+    level = grid.scaled(factor)
     tried: list[CoarseModel] = []
     for candidate in candidates:
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
@@ -107,7 +107,7 @@ def _descend(
     _require_no_rival(best, tried, level)
     while not _reaches_tie_points(factor):
         finer_factor = max(factor / _STEP, 1.0)
-        finer_level = grid if finer_factor == 1 else grid.scaled(finer_factor)
+        finer_level = grid.scaled(finer_factor)
         finer = fit_level(matcher, finer_level, best.model, _reach_px(factor / finer_factor), quiet)
         if _alarms(finer) < _HOPELESS:
             best = finer

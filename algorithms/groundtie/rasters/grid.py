@@ -10,7 +10,7 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from typing import Any
 
@@ -193,23 +193,20 @@ class Grid:
 
     def scaled(self, factor: float) -> Grid:
         """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
+        if factor == 1:
+            return self
         width, height = (max(int(side / factor + 1e-6), 1) for side in self.size)
         return self.on_same_map(compose(self.transform, Affine.scale(factor)), width, height)
 
     def window(self, col: int, row: int, width: int, height: int) -> Grid:
         """Return the part of this lattice that starts at a pixel; it may reach beyond the grid."""
-        return replace(
-            self,
-            transform=compose(self.transform, Affine.translation(col, row)),
-            width=width,
-            height=height,
-            is_on_pixels=not self.is_georeferenced,
-        )
+        place = compose(self.transform, Affine.translation(col, row))
+        return self.on_same_map(place, width, height)
 
     def shifted(self, dx: float, dy: float) -> Grid:
         """Return this grid moved by map units."""
         place = compose(Affine.translation(dx, dy), self.transform)
-        return replace(self, transform=place, is_on_pixels=not self.is_georeferenced)
+        return self.on_same_map(place, *self.size)
 
     def on_same_map(self, transform: Affine, width: int, height: int) -> Grid:
         """Return another lattice on the map of this one."""

@@ -71,7 +71,7 @@ class SeriesFrame:
         date elsewhere does not move it.
         """
         factor = float(np.median([grid.pixel_size_m for grid in dates])) / hub.pixel_size_m
-        grid = hub.scaled(factor) if factor > 1 else hub
+        grid = hub.scaled(max(factor, 1.0))
         boxes = [_box(grid, date) for date in dates]
         low, high = np.median([box for box in boxes if np.isfinite(box).all()], axis=0)
         centre = (low + high) / 2
