@@ -2,44 +2,25 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio
 import rasterio.windows
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, MaskFlags, Resampling
-from rasterio.env import env_ctx_if_needed
 from scipy import sparse
 
 from .averaging import overlaps, weighted_sums
-from .handles import OpenDataset
+from .handles import FileHandles
 from .metadata import numpy_dtype
 from .tiff_directories import Image
 from .windows import Mask, Window
-
-# Files beside the one that is written are none of its own.
-_ALONE = {"GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR"}
 
 # Types of which double precision holds all means.
 _MEANS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
 Task = tuple[list[int], Window]
-
-
-@contextlib.contextmanager
-def before_level(path: Path, number: int) -> Iterator[OpenDataset]:
-    """Open the level before an overview, numbered from 1, in the file in which it is finished.
-
-    By one handle for all threads, so that no block is decompressed twice for the pixels around.
-    """
-    level = {"overview_level": number - 2} if number > 1 else {}
-    with rasterio.Env(**_ALONE), rasterio.open(path, sharing=False, **level) as dataset:
-        yield OpenDataset(dataset)
 
 
 @dataclass(frozen=True)
@@ -56,7 +37,7 @@ class Reduced:
         Whether pixels are picked; else they are averages of what is valid.
     """
 
-    handles: OpenDataset
+    handles: FileHandles
     level: Image
     nearest: bool
 
@@ -73,7 +54,7 @@ class Reduced:
         None where it may stay unknown: there is no mask, or the band is not the file's first.
         """
         bands, window = task
-        with env_ctx_if_needed(), self.handles.borrow() as dataset:
+        with self.handles.borrow() as dataset:
             found = None if self.nearest else self._means(dataset, bands, window)
             return found or self._resampled(dataset, bands, window)
 

@@ -21,6 +21,7 @@ from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
 from .atomic import scratch_file, scratch_folder, writing
 from .grid import Grid
+from .handles import FileHandles
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
 from .nodata import is_nodata, nodata_range
@@ -28,7 +29,7 @@ from .reading import RasterSource
 from .tiff_blocks import PixelType
 from .tiff_directories import BLOCK, base_image
 from .tiff_file import TiledFile, require_space
-from .tiff_overviews import Reduced, before_level
+from .tiff_overviews import Reduced
 from .tiling import in_order
 from .windows import Mask
 
@@ -205,7 +206,8 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
     for number in range(1, count):
         file.finish(number)
         part = progress.part((number - 1) / (count - 1), number / (count - 1))
-        with before_level(file.path, number) as handles:
+        before = FileHandles(os.fspath(file.path), None if number == 1 else number - 2)
+        with contextlib.closing(before) as handles:
             reduced = Reduced(handles, file.levels[number], nearest)
             tasks = reduced.tasks(file.bands)
             for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
