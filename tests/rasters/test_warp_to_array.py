@@ -12,8 +12,7 @@ from affine import Affine
 from raster_files import utm_grid, waves, write_raster
 
 from groundtie.arrays import Raster
-from groundtie.errors import CancelledError, ParameterError
-from groundtie.progress import Progress
+from groundtie.errors import ParameterError
 from groundtie.rasters import tiling
 from groundtie.rasters.delivery import warp_raster, warp_to_array
 from groundtie.rasters.grid import Grid
@@ -97,21 +96,6 @@ def test_a_nodata_value_that_does_not_fit() -> None:
     image = Raster(np.zeros((40, 50), np.uint8), nodata=-1)
     with open_raster(image) as source, pytest.raises(ParameterError):
         warp_to_array(source, source.grid.map_to_pixel, source.grid)
-
-
-def test_progress_and_cancelling() -> None:
-    seen: list[float] = []
-    with open_raster(np.zeros((100, 70))) as source:
-        report = Progress(lambda fraction, message: seen.append(fraction))
-        warp_to_array(source, source.grid.map_to_pixel, source.grid, progress=report)
-        assert seen == sorted(seen) and seen[-1] == 1
-        with pytest.raises(CancelledError):
-            warp_to_array(
-                source,
-                source.grid.map_to_pixel,
-                source.grid,
-                progress=Progress(is_cancelled=lambda: True),
-            )
 
 
 def test_a_part_of_plain_pixels_keeps_its_place(tmp_path: Path) -> None:

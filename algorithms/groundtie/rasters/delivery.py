@@ -197,7 +197,6 @@ def warp_to_array(
     resampling: str = "cubic",
     *,
     workers: int = 2,
-    progress: Progress = SILENT,
 ) -> Raster:
     """Resample a raster onto a grid, as `warp_raster` does, into an array.
 
@@ -213,7 +212,7 @@ def warp_to_array(
     values = np.empty((source.count, target.height, target.width), source.dtype)
     valid = np.ones(values.shape[1:], bool)
     with ThreadPoolExecutor(workers) as pool:
-        for tile, group, part, known, _ in warp.tiles(pool, workers + 1, progress):
+        for tile, group, part, known, _ in warp.tiles(pool, workers + 1, SILENT):
             rows, cols = tile.slices
             values[group[0] - 1 : group[-1], rows, cols] = part
             if group is warp.groups[0]:
