@@ -23,7 +23,7 @@ from .geometry.estimation import Estimate, fit_without_blocks
 from .geometry.models import KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
-from .geometry.transform import Transform, as_positions
+from .geometry.transform import as_positions
 from .kinds import Choice, Number
 from .matching.surface_fit import FIT_RADIUS_PX, check_points
 from .memory import bounded_cache
@@ -240,7 +240,7 @@ def judge(
     """
     with _stages(reference, input, spec, context) as (stages, running):
         pair = stages.masked.pair
-        transform = Transform(model, pair.grid.crs, pair.input.source.grid)
+        transform = pair.transform(model)
         used = points.take(points.used)
         px = pair.grid.map_to_pixel(used.reference_xy)
         nominal_px = pair.grid.map_to_pixel(used.nominal_xy(transform))

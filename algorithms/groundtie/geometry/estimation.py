@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -79,10 +79,10 @@ class Estimate:
             Fewer points agree than a spline needs.
         """
         grid = pair.grid
-        nominal = Transform.nominal(grid.crs, pair.input.source.grid)
         if kind == "tps":
+            nominal = Transform.nominal(grid.crs, pair.input.source.grid)
             fitted = fit_thin_plate(points, nominal, grid, fitted.model, radius_px)
-        transform = replace(nominal, model=fitted.model.on_map(grid.centre_transform))
+        transform = pair.transform(fitted.model.on_map(grid.centre_transform))
         return cls(transform, points, fitted.fold_models)
 
     def folds_on(self, grid: Grid) -> tuple[PointFunction, ...]:

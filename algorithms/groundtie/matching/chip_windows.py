@@ -62,7 +62,7 @@ class Resampled:
         cls, pair: ImagePair, model: Model, grid: Grid, reach_px: int, context: Context
     ) -> Resampled:
         """Resample images by the misregistration on the map; parameters as `of`."""
-        return cls.of(pair, lambda xy: pair.nominal_px(model(xy)), grid, reach_px, context)
+        return cls.of(pair, pair.transform(model), grid, reach_px, context)
 
     @classmethod
     def of(

@@ -178,7 +178,7 @@ def _patches(
         return replace(pair, reference=image).reference_patch(template, hidden)
 
     def of_input(image: Image) -> Patch:
-        return replace(pair, input=image).input_patch(search, lambda xy: pair.nominal_px(model(xy)))
+        return replace(pair, input=image).input_patch(search, pair.transform(model))
 
     reading = context.executor.submit(of_reference, pair.reference)
     input = of_input(pair.input)

@@ -148,7 +148,7 @@ class KeypointFit:
         count, sigma = len(matches.px), fit.mixture.sigma
         points = TiePoints(
             reference_xy=grid.pixel_to_map(matches.px),
-            input_px=pair.nominal_px(coarse(grid.pixel_to_map(matches.partner_px))),
+            input_px=pair.transform(coarse)(grid.pixel_to_map(matches.partner_px)),
             score=matches.score,
             covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
             # Peaks are those of both ways together.

@@ -80,11 +80,8 @@ class KeypointMatcher:
         piece = self.pair.grid.window(*area)
         masked = None if self.held_out is None else self.held_out(piece)
         reference = self.pair.reference_patch(piece, masked)
-
-        def nominal_px(xy: FloatArray) -> FloatArray:
-            return self.pair.nominal_px(coarse(xy))
-
-        input = self.pair.input_patch(piece, nominal_px)
+        to_input_px = self.pair.transform(coarse)
+        input = self.pair.input_patch(piece, to_input_px)
         if masked is not None:
             # Where a descriptor sees less of the one image, it sees as little of the other.
             input = Patch(input.values, input.valid & ~masked)
@@ -93,7 +90,7 @@ class KeypointMatcher:
         if self.shown is not None:
             parts = (
                 self.shown.reference_patch(piece).valid,
-                self.shown.input_patch(piece, nominal_px).valid,
+                self.shown.input_patch(piece, to_input_px).valid,
             )
         own = self._features(reference, core, parts[0])
         others = self._features(input, core.widened(gate), parts[1])

@@ -178,7 +178,7 @@ def _tie_points(
     there_and_back = shifts(peaks(surfaces.forward)) - shifts(peaks(surfaces.backward))
     points = TiePoints(
         reference_xy=grid.pixel_to_map(centres),
-        input_px=pair.nominal_px(model(grid.pixel_to_map(centres + shifts(found)))),
+        input_px=pair.transform(model)(grid.pixel_to_map(centres + shifts(found))),
         score=np.array([peak.height for peak in found]),
         covariance_px2=np.array([p.covariance_px2 for p in found]).reshape(-1, 2, 2),
         forward_backward_error_px=np.hypot(*there_and_back.T),

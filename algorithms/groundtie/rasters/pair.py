@@ -9,6 +9,8 @@ import numpy as np
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError, SameFileError
 from ..geometry.limits import SearchLimits
+from ..geometry.models import Model
+from ..geometry.transform import Transform
 from .colours import Colours
 from .grid import FloatArray, Grid, PointFunction, finite
 from .patch import Patch, empty_areas
@@ -210,6 +212,10 @@ class ImagePair:
     def nominal_px(self, xy: FloatArray) -> FloatArray:
         """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""
         return self.grid.to_pixels_of(self.input.source.grid)(xy)
+
+    def transform(self, model: Model) -> Transform:
+        """Return the transform between the images that a misregistration on the map makes."""
+        return Transform(model, self.grid.crs, self.input.source.grid)
 
 
 def make_pair(

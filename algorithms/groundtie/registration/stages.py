@@ -160,10 +160,10 @@ class Stages:
 
     def _input_fit(self, estimate: Estimate) -> ModelFit | None:
         """Return how well a surface model fits the registered input as a whole."""
-        surface, pair, model = self.masked.surface, self.masked.pair, estimate.transform.model
+        surface, pair = self.masked.surface, self.masked.pair
 
         def registered(piece: Grid) -> Patch:
-            return pair.input_patch(piece, lambda xy: pair.nominal_px(model(xy)))
+            return pair.input_patch(piece, estimate.transform)
 
         if surface is not None:
             grid = surface.scene.grid
