@@ -167,7 +167,7 @@ class Review:
         TooFewPointsError
             They are fewer than the model needs.
         """
-        return decide(TiePointEvidence.of(self.points, kind, self.input_grid), "").reason
+        return decide(TiePointEvidence.of(self.points, kind, self.input_grid)).reason
 
     def fits(self, kinds: Sequence[str] = KINDS) -> dict[str, ModelFit]:
         """Return the models that can be fitted at once, by their kinds."""

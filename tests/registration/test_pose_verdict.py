@@ -11,7 +11,8 @@ from groundtie.geometry.limits import SearchLimits
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.pose.search import find_poses
 from groundtie.rasters.patch import Patch
-from groundtie.registration.pose_verdict import PoseEvidence, judge_pose
+from groundtie.registration.pose_verdict import PoseEvidence
+from groundtie.registration.verdict import decide
 
 TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 # As wide as any search: half of the input's longer side.
@@ -30,18 +31,18 @@ def windows() -> tuple[Patch, Patch]:
 class TestWhatAnExhaustiveSearchFound:
     def test_a_pose_that_stands_out(self, windows: tuple[Patch, Patch], context: Context) -> None:
         evidence = PoseEvidence.of(windows, ANY, candidates(12.0, 4.0), True, context)
-        assert judge_pose(evidence).accepted
+        assert decide(evidence).accepted
         assert evidence.summary() == {"height": 12.0, "rival_ratio": 3.0}
 
     def test_a_rival(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(12.0, 12.0 / 1.6 + 0.1)
-        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, True, context))
+        verdict = decide(PoseEvidence.of(windows, ANY, found, True, context))
         assert not verdict.accepted
         assert "another pose" in verdict.reason
 
     def test_no_higher_than_chance(self, windows: tuple[Patch, Patch], context: Context) -> None:
         found = candidates(4.9, 1.0)
-        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, True, context))
+        verdict = decide(PoseEvidence.of(windows, ANY, found, True, context))
         assert not verdict.accepted
         assert "chance" in verdict.reason
 
@@ -50,7 +51,7 @@ class TestWhatAnExhaustiveSearchFound:
         self, windows: tuple[Patch, Patch], heights: tuple[float, ...], context: Context
     ) -> None:
         evidence = PoseEvidence.of(windows, ANY, candidates(*heights), True, context)
-        assert not judge_pose(evidence).accepted
+        assert not decide(evidence).accepted
         assert evidence.rival_ratio is None
 
 
@@ -71,7 +72,7 @@ class TestWhatAnotherSearchFound:
         self, windows: tuple[Patch, Patch], context: Context, pose: Pose, accepted: bool
     ) -> None:
         found = [PoseFound(pose, 99.0)]
-        verdict = judge_pose(PoseEvidence.of(windows, ANY, found, False, context))
+        verdict = decide(PoseEvidence.of(windows, ANY, found, False, context))
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 
@@ -81,7 +82,7 @@ class TestWhatAnotherSearchFound:
     ) -> None:
         limits = SearchLimits(30, 10, (1.0, 1.0))
         found = find_poses(*windows, limits, context)
-        verdict = judge_pose(PoseEvidence.of(windows, limits, found, True, context))
+        verdict = decide(PoseEvidence.of(windows, limits, found, True, context))
         assert not verdict.accepted
         assert "prefers 50" in verdict.reason or "prefers 49" in verdict.reason
 
@@ -99,7 +100,7 @@ def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context)
     found = find_poses(reference, input, limits, context)
     assert abs(found[0].pose.shift_px[0] + 7) < 1
     evidence = PoseEvidence.of((reference, input), limits, found, True, context)
-    assert not judge_pose(evidence).accepted
+    assert not decide(evidence).accepted
 
 
 @pytest.mark.slow
@@ -107,13 +108,12 @@ def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context)
 def test_two_places_are_refused(seed: int, context: Context) -> None:
     windows = turned_pair(TRUTH, seed=seed, input_seed=seed + 100)
     found = find_poses(*windows, ANY, context)
-    assert not judge_pose(PoseEvidence.of(windows, ANY, found, True, context)).accepted
+    assert not decide(PoseEvidence.of(windows, ANY, found, True, context)).accepted
 
 
 def test_windows_without_content_are_refused(context: Context) -> None:
     flat = patch(np.ones((50, 50)))
-    verdict = judge_pose(
-        PoseEvidence.of((flat, flat), ANY, [PoseFound(Pose(), 9.0)], False, context)
-    )
+    evidence = PoseEvidence.of((flat, flat), ANY, [PoseFound(Pose(), 9.0)], False, context)
+    verdict = decide(evidence)
     assert not verdict.accepted
     assert "too little" in verdict.reason

@@ -46,23 +46,6 @@ class Evidence(Protocol):
     def stages(self) -> Collection[str]: ...
 
 
-class EvidenceOfBands(Evidence, Protocol):
-    """Evidence of which the bands of the images are a part.
-
-    Parameters
-    ----------
-    scene
-        What the images are.
-    max_error_px
-        Largest error that is accepted, in matching pixels.
-    """
-
-    @property
-    def scene(self) -> SceneInfo: ...
-    @property
-    def max_error_px(self) -> float: ...
-
-
 @dataclass(frozen=True)
 class ImagesEvidence:
     """What is known of a pair before anything is matched.

@@ -67,7 +67,7 @@ def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: 
 def begin(opened: OpenPair, masked: Masked, spec: Specification) -> Registration:
     """Return a registration of which only the images are judged: refused by them, or by no rule."""
     scene, used = masked.scene, masked.used
-    verdict = decide(ImagesEvidence(scene, used, spec.largest_error_px), "")
+    verdict = decide(ImagesEvidence(scene, used, spec.largest_error_px))
     if verdict.accepted:
         verdict = NOT_JUDGED
     return Registration(masked.pair, spec, scene, used, verdict, started=opened.started)

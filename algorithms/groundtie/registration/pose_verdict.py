@@ -31,7 +31,7 @@ from .evidence import AGREEMENT, BANDS, ERROR, POSE, SURVEY, Agreement, hull_sha
 from .layover import CHIPS_MEAN_OVER_SCATTER, mean_of_heights_px
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
-from .verdict import Verdict, decide, judge
+from .verdict import Verdict, judge
 
 
 @dataclass(frozen=True)
@@ -185,11 +185,6 @@ class PoseSurveyEvidence:
         """Share of the overlap outside of the hull of the chips that agree."""
         grid, agreeing = self.found.grid, self.found.px[self.found.agrees]
         return 1 - hull_share(agreeing.astype(float), grid.size)
-
-
-def judge_pose(evidence: PoseEvidence) -> Verdict:
-    """Return the verdict on the best candidate of a search."""
-    return decide(evidence, "no other pose matches nearly as well")
 
 
 def confirm_pose(

@@ -53,7 +53,7 @@ def load_stored(
     ).all():
         raise TransformFileError(f"{path} holds points that lie outside of their map's projection")
     evidence = TiePointEvidence.of(points, model, source.grid)
-    verdict = decide(evidence, "")
+    verdict = decide(evidence)
     if not verdict.accepted:
         raise NotRegisteredError(f"{path}: {verdict.sentence()}")
     return evidence.transform, evidence.fit()

@@ -120,7 +120,7 @@ def refusals(evidence: Evidence) -> Iterator[tuple[Rule, str]]:
             yield rule, reason
 
 
-def decide(evidence: Evidence, confirmed: str) -> Verdict:
+def decide(evidence: Evidence, confirmed: str = "") -> Verdict:
     """Return what the rules make of evidence, without its numbers; `confirmed` is why it stands."""
     refusal = next(refusals(evidence), None)
     if refusal is None:
@@ -137,7 +137,7 @@ def judge_search(failure: GroundTieError) -> Verdict:
     GroundTieError
         The failure itself, if no rule names it: it is no refusal, but bad input.
     """
-    verdict = decide(SearchEvidence(failure), "")
+    verdict = decide(SearchEvidence(failure))
     if verdict.accepted:
         raise failure
     return verdict

@@ -19,8 +19,8 @@ from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
 from ..rasters.reading import open_raster
-from ..registration.pose_verdict import PoseEvidence, confirm_pose, judge_pose
-from ..registration.verdict import Verdict
+from ..registration.pose_verdict import PoseEvidence, confirm_pose
+from ..registration.verdict import Verdict, decide
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
@@ -203,7 +203,7 @@ def estimate_rotation(
         context.update(0.5, "checking")
         exhaustive = search == DEFAULT_SEARCH
         evidence = PoseEvidence.of(pair, limits, found, exhaustive, context.quiet())
-        verdict = judge_pose(evidence)
+        verdict = decide(evidence)
         pose = found[0].pose if found else None
         if verdict.accepted and pose is not None:
             verdict, pose = confirm_pose((own, other), windows, pose, context.quiet())
