@@ -126,10 +126,12 @@ class Agreement:
         misses: Misses,
         total: int,
         area: str,
-        spread_px: FloatArray,
-        accuracy: Accuracy,
+        places_px: FloatArray,
+        fold_models: Sequence[PointFunction],
+        common: Common,
         tries: int = 1,
         least_share: float = SMALLEST_INLIER_SHARE,
+        least_spread_px: FloatArray | float = 0.0,
     ) -> Agreement:
         """Return how points agree by what a model misses those by that have a peak.
 
@@ -139,12 +141,19 @@ class Agreement:
             Of points with a peak.
         total
             How many points there are, with and without one.
-        spread_px
-            Standard deviation of the model's predictions at places of the area, shape (n,).
+        places_px
+            Places all over the area, shape (n, 2).
+        fold_models
+            The model without one block of its points after the other.
+        common
+            What displaces all points alike.
         tries
             How many registrations were tried, any of which might agree by chance.
+        least_spread_px
+            Standard deviation that the model's predictions there have at least, shape (n,).
         """
         chance = min(misses.log10_chance(total) + math.log10(tries), 0.0)
+        spread_px = np.maximum(jackknife_spread(fold_models, places_px), least_spread_px)
         return cls(
             name,
             misses.agreeing,
@@ -154,7 +163,7 @@ class Agreement:
             misses.max_error_px,
             float(np.sqrt(np.mean(spread_px**2))),
             area,
-            accuracy,
+            predict_accuracy(fold_models, places_px, misses, common),
             least_share,
         )
 
@@ -269,14 +278,14 @@ class RegistrationEvidence:
     @cached_property
     def held_out(self) -> Agreement:
         """How the check points agree; those without a peak count as disagreeing."""
-        misses, lattice = self._misses, self.grid.lattice()
         return Agreement.of(
             "check points",
-            misses,
+            self._misses,
             len(self.check),
             "the overlap",
-            jackknife_spread(self._folds, lattice),
-            predict_accuracy(self._folds, lattice, misses, self.common),
+            self.grid.lattice(),
+            self._folds,
+            self.common,
             self.tries,
         )
 

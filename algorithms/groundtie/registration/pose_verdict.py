@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..context import Context
-from ..geometry.accuracy import Common, predict_accuracy
-from ..geometry.estimation import jackknife_spread
+from ..geometry.accuracy import Common
 from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
@@ -156,16 +155,15 @@ class PoseSurveyEvidence:
     @cached_property
     def held_out(self) -> Agreement:
         """How each chip agrees with the pose as the others have it."""
-        misses, total = self._misses, len(self.found.agrees)
-        fold_models, lattice = self.found.fold_models, self.found.grid.lattice()
         heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
         return Agreement.of(
             "chips all over",
-            misses,
-            total,
+            self._misses,
+            len(self.found.agrees),
             "the overlap",
-            jackknife_spread(fold_models, lattice),
-            predict_accuracy(fold_models, lattice, misses, Common(2 * heights)),
+            self.found.grid.lattice(),
+            self.found.fold_models,
+            Common(2 * heights),
             least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..assessment.point_errors import PointErrors
 from ..assessment.statistics import Statistics
 from ..errors import NotRegisteredError, TooFewPointsError
-from ..geometry.accuracy import NOTHING_COMMON, Common, predict_accuracy
+from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
@@ -91,15 +91,16 @@ class RefinementEvidence:
     def held_out(self) -> Agreement:
         """How points that took no part agree with the refined RPCs."""
         name, _, after = self._held
-        misses, bias = self._misses, self.adjustment.bias
         nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
         return Agreement.of(
             name,
-            misses,
+            self._misses,
             len(after),
             "the image",
-            np.maximum(self.adjustment.spread_px(nodes_px), bias.sigma_px(nodes_px)),
-            predict_accuracy(self.adjustment.fold_biases, nodes_px, misses, self.common),
+            nodes_px,
+            self.adjustment.fold_biases,
+            self.common,
+            least_spread_px=self.adjustment.bias.sigma_px(nodes_px),
         )
 
     @property

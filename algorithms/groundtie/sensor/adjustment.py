@@ -90,10 +90,6 @@ class Adjustment:
     left_out_px: FloatArray
     left_out_rmse_px: dict[str, float]
 
-    def spread_px(self, px: FloatArray) -> FloatArray:
-        """Return how far corrections vary with the points, shape (n,): the blocks' jackknife."""
-        return jackknife_spread(self.fold_biases, px)
-
 
 def adjust(control: Control, kind: str = AUTO) -> Adjustment:
     """Estimate the bias of RPCs by weighted least squares without the blunders.
@@ -128,10 +124,8 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
 def _is_carried(tried: Adjustment, control: Control) -> bool:
     """Return whether points hold a model all over the image."""
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * control.size
-    return bool(
-        max(tried.bias.sigma_px(corners).max(), np.median(tried.spread_px(corners)))
-        < _LARGEST_SIGMA_PX * np.sqrt(2)
-    )
+    spread = np.median(jackknife_spread(tried.fold_biases, corners))
+    return bool(max(tried.bias.sigma_px(corners).max(), spread) < _LARGEST_SIGMA_PX * np.sqrt(2))
 
 
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
