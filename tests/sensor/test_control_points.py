@@ -52,7 +52,7 @@ def some_points(orientation: Orientation, count: int = 12) -> ControlPoints:
         np.arange(count) % 4 == 0,
         state,
     )
-    return ControlPoints(points, orientation.heights_at(points.reference_xy) + 2.5, UTM)
+    return ControlPoints.of(points, orientation.heights_at(points.reference_xy) + 2.5, UTM)
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".geojson", ".csv"])
@@ -62,12 +62,12 @@ def test_points_come_back_with_height_and_covariance(
     points = some_points(located[0])
     points.write(tmp_path / f"points{suffix}", *located)
     found = read_control_points(tmp_path / f"points{suffix}", *located)
-    np.testing.assert_allclose(found.points.input_px, points.points.input_px, atol=1e-6)
-    np.testing.assert_allclose(found.points.reference_xy, points.points.reference_xy, atol=1e-6)
+    np.testing.assert_allclose(found.input_px, points.input_px, atol=1e-6)
+    np.testing.assert_allclose(found.reference_xy, points.reference_xy, atol=1e-6)
     np.testing.assert_allclose(found.height_m, points.height_m, atol=1e-6)
-    np.testing.assert_allclose(found.points.covariance_px2, points.points.covariance_px2, rtol=1e-6)
-    np.testing.assert_array_equal(found.points.is_check, points.points.is_check)
-    np.testing.assert_array_equal(found.points.used, points.points.used)
+    np.testing.assert_allclose(found.covariance_px2, points.covariance_px2, rtol=1e-6)
+    np.testing.assert_array_equal(found.is_check, points.is_check)
+    np.testing.assert_array_equal(found.used, points.used)
     assert found.crs == UTM
 
 
@@ -77,18 +77,18 @@ def test_the_georeferencers_points_get_the_grounds_height(
     points = some_points(located[0])
     points.write(tmp_path / "a.points", *located)
     found = read_control_points(tmp_path / "a.points", *located)
-    np.testing.assert_allclose(found.points.input_px, points.points.input_px, atol=1e-6)
+    np.testing.assert_allclose(found.input_px, points.input_px, atol=1e-6)
     np.testing.assert_allclose(found.height_m, points.height_m - 2.5, atol=1e-6)
-    np.testing.assert_allclose(found.points.covariance_px2, [np.eye(2)] * len(points))
+    np.testing.assert_allclose(found.covariance_px2, [np.eye(2)] * len(points))
     lines = (tmp_path / "a.points").read_text().splitlines()[2:]
     numbers = np.array([line.split(",")[5:] for line in lines], float)
-    residual = points.points.input_px - located[0].to_px(points.points.reference_xy)
+    residual = points.input_px - located[0].to_px(points.reference_xy)
     # Its rows count upwards.
     np.testing.assert_allclose(numbers[:, :2], residual * [1, -1], atol=1e-6)
     np.testing.assert_allclose(numbers[:, 2], np.hypot(*residual.T), atol=1e-6)
     assert numbers[:, 2].max() < 5
     # It knows no check points: they are switched off.
-    assert found.points.used.tolist() == (points.points.used & ~points.points.is_check).tolist()
+    assert found.used.tolist() == (points.used & ~points.is_check).tolist()
 
 
 def test_the_georeferencer_has_an_images_own_geotransform(
@@ -101,16 +101,16 @@ def test_the_georeferencer_has_an_images_own_geotransform(
     points.write(tmp_path / "a.points", orientation, nominal)
     _, *lines = (tmp_path / "a.points").read_text().splitlines()
     source_x, source_y = np.loadtxt(lines[1:], delimiter=",")[:, 2:4].T
-    col, row = points.points.input_px.T
+    col, row = points.input_px.T
     np.testing.assert_allclose(source_x, 10 + 0.5 * (col + 0.5), atol=1e-6)
     np.testing.assert_allclose(source_y, 50 - 0.5 * (row + 0.5), atol=1e-6)
     found = read_control_points(tmp_path / "a.points", orientation, nominal)
-    np.testing.assert_allclose(found.points.input_px, points.points.input_px, atol=1e-6)
+    np.testing.assert_allclose(found.input_px, points.input_px, atol=1e-6)
     # Without a CRS of its own, the file's map is that of the orientation.
     (tmp_path / "a.points").write_text("\n".join(lines))
     bare = read_control_points(tmp_path / "a.points", orientation, nominal)
     assert bare.crs == orientation.crs
-    np.testing.assert_allclose(bare.points.input_px, points.points.input_px, atol=1e-6)
+    np.testing.assert_allclose(bare.input_px, points.input_px, atol=1e-6)
 
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857", "EPSG:32633", "EPSG:3035", "EPSG:4937"])
@@ -119,12 +119,8 @@ def test_residuals_do_not_depend_on_the_map_that_the_points_lie_on(
     tmp_path: Path, located: tuple[Orientation, Grid], crs: str, suffix: str
 ) -> None:
     points = some_points(located[0])
-    xy = np.column_stack(
-        rasterio.warp.transform(UTM, CRS.from_string(crs), *points.points.reference_xy.T)
-    )
-    elsewhere = replace(
-        points, points=replace(points.points, reference_xy=xy), crs=CRS.from_string(crs)
-    )
+    xy = np.column_stack(rasterio.warp.transform(UTM, CRS.from_string(crs), *points.reference_xy.T))
+    elsewhere = replace(points, reference_xy=xy, crs=CRS.from_string(crs))
     for name, written in (("here", points), ("elsewhere", elsewhere)):
         written.write(tmp_path / f"{name}.{suffix}", *located)
     here, there = (residuals(tmp_path / f"{name}.{suffix}") for name in ("here", "elsewhere"))
@@ -163,7 +159,7 @@ def test_heights_that_do_not_count_from_the_ellipsoid_are_refused(
     tmp_path: Path, located: tuple[Orientation, Grid], crs: str
 ) -> None:
     points = some_points(located[0])
-    columns = [points.points.reference_xy, points.points.input_px, points.height_m[:, None]]
+    columns = [points.reference_xy, points.input_px, points.height_m[:, None]]
     lines = ["reference_x,reference_y,input_col,input_row,height_m,reference_crs"]
     lines += [",".join(f"{v:.6f}" for v in row) + f",{crs}" for row in np.hstack(columns)]
     table = tmp_path / "a.csv"
@@ -198,12 +194,12 @@ def test_gdal_takes_its_options(tmp_path: Path, located: tuple[Orientation, Grid
     points = some_points(located[0])
     points.write(tmp_path / "gcps.txt", *located)
     words = [line.split() for line in (tmp_path / "gcps.txt").read_text().splitlines()]
-    kept = points.take(points.points.used & ~points.points.is_check)
+    kept = points.take(points.used & ~points.is_check)
     assert words[0] == ["-a_srs", "EPSG:32632"]
     numbers = np.array([line[1:] for line in words[1:]], float)
     assert {line[0] for line in words[1:]} == {"-gcp"}
-    np.testing.assert_allclose(numbers[:, :2], kept.points.input_px + 0.5, atol=1e-5)
-    np.testing.assert_allclose(numbers[:, 2:4], kept.points.reference_xy, atol=1e-6)
+    np.testing.assert_allclose(numbers[:, :2], kept.input_px + 0.5, atol=1e-5)
+    np.testing.assert_allclose(numbers[:, 2:4], kept.reference_xy, atol=1e-6)
     np.testing.assert_allclose(numbers[:, 4], kept.height_m, atol=1e-3)
 
 
@@ -224,13 +220,13 @@ def test_lines_lead_from_where_the_rpcs_see_a_point(
     points.write(tmp_path / "a.gpkg", *located)
     with fiona.open(tmp_path / "a.gpkg") as layer:
         ends = np.array([feature["geometry"]["coordinates"] for feature in layer])
-    np.testing.assert_allclose(ends[:, 0], located[0].to_map(points.points.input_px), atol=1e-6)
-    np.testing.assert_allclose(ends[:, 1], points.points.reference_xy, atol=1e-6)
+    np.testing.assert_allclose(ends[:, 0], located[0].to_map(points.input_px), atol=1e-6)
+    np.testing.assert_allclose(ends[:, 1], points.reference_xy, atol=1e-6)
 
 
 def test_a_table_needs_positions_alone(tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
     points = some_points(located[0])
-    rows = np.column_stack([points.lon_lat, points.points.input_px])
+    rows = np.column_stack([points.lon_lat, points.input_px])
     table = tmp_path / "a.csv"
     lines = ["reference_x,reference_y,input_col,input_row,reference_crs"]
     lines += [",".join(f"{value:.12f}" for value in row) + ",EPSG:4326" for row in rows]
@@ -249,7 +245,7 @@ def test_points_off_the_terrain_are_rejected(
         "20.0,45.15,1,2,EPSG:4326\n"
     )
     found = read_control_points(table, *located)
-    assert found.points.state.tolist() == ["used", "rejected: no height"]
+    assert found.state.tolist() == ["used", "rejected: no height"]
 
 
 @pytest.mark.parametrize(
@@ -289,12 +285,12 @@ class TestFormatsOfOthers:
         return json.dumps({"type": "FeatureCollection", "features": features})
 
     def expect(self, found: ControlPoints, which: list[int], heights: bool = True) -> None:
-        np.testing.assert_allclose(found.points.input_px, self.PX[which], atol=1e-9)
+        np.testing.assert_allclose(found.input_px, self.PX[which], atol=1e-9)
         np.testing.assert_allclose(found.lon_lat, self.LON_LAT[which], atol=1e-9)
         if heights:
             np.testing.assert_allclose(found.height_m, self.HEIGHT[which])
-        assert found.points.used.all() and not found.points.is_check.any()
-        np.testing.assert_allclose(found.points.covariance_px2, [np.eye(2)] * len(which))
+        assert found.used.all() and not found.is_check.any()
+        np.testing.assert_allclose(found.covariance_px2, [np.eye(2)] * len(which))
 
     def test_orthority(self, tmp_path: Path, located: tuple[Orientation, Grid]) -> None:
         path = tmp_path / "gcps.geojson"

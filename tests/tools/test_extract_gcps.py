@@ -35,7 +35,7 @@ def test_points_lie_where_the_true_rpcs_see_them(scene: Scene, tmp_path: Path) -
     result = call(scene, tmp_path / "gcps.gpkg")
     points = result.points
     seen = points.seen_by(scene.truth, SIZE)
-    miss = np.hypot(*seen.residuals_px(None).T)[points.points.used]
+    miss = np.hypot(*seen.residuals_px(None).T)[points.used]
     assert len(miss) > 20
     assert (miss < 2).mean() >= 0.9
     assert np.median(miss) < 0.7
@@ -59,10 +59,10 @@ def test_what_a_classifier_leaves_out_of_the_image_takes_no_part(
     classifier = bright_is_left_out(tmp_path / "c.json", 128)
     found = call(scene, tmp_path / "g.csv", image=image, image_mask=classifier).points
     # Chips whose middles lie just in the bright half still see some of the other one.
-    used = found.points.input_px[found.points.used]
+    used = found.input_px[found.used]
     assert len(used) > 10
     assert used[:, 0].max() < half + 40
-    miss = np.hypot(*found.seen_by(scene.truth, SIZE).residuals_px(None).T)[found.points.used]
+    miss = np.hypot(*found.seen_by(scene.truth, SIZE).residuals_px(None).T)[found.used]
     assert np.median(miss) < 0.7
 
 
@@ -144,5 +144,5 @@ def test_the_map_may_have_another_crs(scene: Scene, tmp_path: Path) -> None:
     turned = write_raster(tmp_path / "laea.tif", out, Grid(transform, crs, width, height), nodata=0)
     result = call(scene, tmp_path / "gcps.geojson", reference=turned)
     seen = result.points.seen_by(scene.truth, SIZE)
-    miss = np.hypot(*seen.residuals_px(None).T)[result.points.points.used]
+    miss = np.hypot(*seen.residuals_px(None).T)[result.points.used]
     assert np.median(miss) < 0.8

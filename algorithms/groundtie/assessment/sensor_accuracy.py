@@ -43,20 +43,19 @@ class SensorErrors:
         GeoreferencingError
             Points lie where the map has no ground, or have no ground or no image by the RPCs.
         """
-        table = points.points
-        seen = rpc.localise(table.input_px, points.height_m)
-        moved = reproject(seen, LON_LAT, points.crs) - table.reference_xy
+        seen = rpc.localise(points.input_px, points.height_m)
+        moved = reproject(seen, LON_LAT, points.crs) - points.reference_xy
         moved = near_longitude(moved, 0.0, points.crs)
-        error_px = table.input_px - rpc.project(points.lon_lat, points.height_m)
+        error_px = points.input_px - rpc.project(points.lon_lat, points.height_m)
         placed = np.isfinite(np.hstack([moved, error_px])).all(axis=1)
         if not placed.all():
             raise GeoreferencingError(
                 f"the RPCs cannot place {np.sum(~placed)} of {len(points)} points, the first at "
-                f"{table.reference_xy[~placed][0].tolist()} on the map and "
-                f"{table.input_px[~placed][0].tolist()} in the image: check these positions and "
+                f"{points.reference_xy[~placed][0].tolist()} on the map and "
+                f"{points.input_px[~placed][0].tolist()} in the image: check these positions and "
                 "the points' CRS"
             )
-        per_unit = metres_per_unit_at(table.reference_xy.mean(axis=0), points.crs)
+        per_unit = metres_per_unit_at(points.reference_xy.mean(axis=0), points.crs)
         return cls(error_px, moved * per_unit)
 
     def summary(self) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def table_lines(errors: dict[str, SensorErrors]) -> list[str]:
 def write_table(path: Path, points: ControlPoints, errors: dict[str, SensorErrors]) -> None:
     """Write the errors of each point as CSV."""
     names = ["x", "y", "height_m", "col", "row"]
-    columns = [points.points.reference_xy, points.height_m[:, None], points.points.input_px]
+    columns = [points.reference_xy, points.height_m[:, None], points.input_px]
     for name, each in errors.items():
         names += [f"{name}_{axis}" for axis in ("x_m", "y_m", "col_px", "row_px")]
         columns += [each.error_m, each.error_px]
@@ -114,7 +113,7 @@ def draw_vectors(
         length = np.hypot(*each.error_px.T)
         unit = round_length(max(float(np.median(length)), SMALLEST_PX))
         stretch = 0.1 * max(size) / unit
-        col, row = points.points.input_px.T
+        col, row = points.input_px.T
         arrows = axes.quiver(
             col, row, *(each.error_px * stretch).T, angles="xy", scale_units="xy", scale=1,
             color=FIT_COLOUR if i else CHECK_COLOUR, width=0.006,

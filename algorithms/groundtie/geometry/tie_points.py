@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from rasterio.crs import CRS
 from ..rasters.grid import FloatArray, Grid, near_longitude
 from .rows import Rows
 from .transform import Transform
+
+if TYPE_CHECKING:
+    from typing import Self  # Python 3.11; annotations alone need it
 
 USED = "used"
 
@@ -126,13 +129,13 @@ class TiePoints(Rows):
             input_px=input_grid.map_to_pixel(self.reference_xy),
         )
 
-    def reject(self, which: NDArray[np.bool_], reason: str) -> TiePoints:
+    def reject(self, which: NDArray[np.bool_], reason: str) -> Self:
         """Return the table with the points `which`, if they were used, rejected for a reason."""
         state = self.state.astype(object)
         state[which & self.used] = f"rejected: {reason}"
         return replace(self, state=state.astype(str))
 
-    def take(self, which: Any) -> TiePoints:
+    def take(self, which: Any) -> Self:
         """Return the rows that the index or mask `which` selects."""
         more = {name: values[which] for name, values in self.more.items()}
         return replace(super().take(which), more=more)

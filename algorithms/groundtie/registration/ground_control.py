@@ -155,7 +155,7 @@ def match_ground_control(
     heights = orientation.heights_at(points.reference_xy)
     points = points.reject(~np.isfinite(heights), "no height")
     heights = np.where(np.isfinite(heights), heights, 0.0)
-    control = ControlPoints(points, heights, orientation.crs)
+    control = ControlPoints.of(points, heights, orientation.crs)
     return GroundControl(registration, control, _common_in_image(registration, by))
 
 

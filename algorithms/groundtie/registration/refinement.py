@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -201,8 +201,7 @@ class Refinement:
         NotRegisteredError
             There are too few.
         """
-        table = points.points
-        fitted, checked = table.fit, table.check
+        fitted, checked = points.fit, points.check
         rpc = image.orientation.rpc
         seen = points.seen_by(rpc, image.source.grid.size)
         control = seen.take(fitted)
@@ -211,7 +210,7 @@ class Refinement:
         except TooFewPointsError as error:
             verdict = judge_search(error)
             raise _refused(image, verdict) from error
-        blunders = np.zeros(len(table), bool)
+        blunders = np.zeros(len(points), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
         needs_spread = not (is_measured and model == SHIFT)
         fit = fold(rpc, adjustment.bias)
@@ -225,9 +224,8 @@ class Refinement:
             needs_spread,
             common,
         )
-        kept = replace(points, points=table.reject(blunders, "blunder"))
-        verdict = judge(evidence)
-        return cls(image, kept, fit, evidence, verdict)
+        kept = points.reject(blunders, "blunder")
+        return cls(image, kept, fit, evidence, judge(evidence))
 
     @property
     def grid(self) -> Grid:
@@ -277,7 +275,7 @@ class Refinement:
         """Return how far points that have heights of their own lie above the ground."""
         points = self.points
         above = points.height_m - self.image.orientation.heights.at(points.lon_lat)
-        above = above[np.isfinite(above) & points.points.used]
+        above = above[np.isfinite(above) & points.used]
         return float(np.median(above)) if len(above) else None
 
 

@@ -58,7 +58,7 @@ class GcpResult:
         return {
             "output": str(self.output),
             "points": len(self.points),
-            "points_used": int(self.points.points.used.sum()),
+            "points_used": int(self.points.used.sum()),
             "heights": self.heights,
             "mask": self.mask.summary(),
             "verdict": self.verdict.summary(),
@@ -66,12 +66,12 @@ class GcpResult:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        table, verdict = self.points.points, self.verdict
+        points, verdict = self.points, self.verdict
         error = both_units(verdict.check_rmse_px, verdict.check_rmse_m)
         return [
             f"accepted: {verdict.reason}",
-            f"{int(table.fit.sum())} of {int((~table.is_check).sum())} "
-            f"points, and {int(table.check.sum())} check points",
+            f"{int(points.fit.sum())} of {int((~points.is_check).sum())} "
+            f"points, and {int(points.check.sum())} check points",
             f"error at check points: RMSE {error}",
             self.heights,
             self.mask.line(),

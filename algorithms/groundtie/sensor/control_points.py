@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rasterio.crs import CRS
@@ -40,46 +39,41 @@ READ_SUFFIXES = (*TIE_POINT_SUFFIXES, *OTHER_SUFFIXES)
 
 
 @dataclass(frozen=True)
-class ControlPoints:
-    """Ground control points of an image with RPCs.
+class ControlPoints(TiePoints):
+    """Ground control points of an image with RPCs; their covariances are in image pixels².
 
     Parameters
     ----------
-    points
-        Position on the map and in the image, scores and state; covariances are in image pixels².
-    height_m
-        Height above the ellipsoid, shape (n,).
     crs
         CRS of the map.
+    height_m
+        Height above the ellipsoid, shape (n,).
     """
 
-    points: TiePoints
-    height_m: FloatArray
     crs: CRS
+    height_m: FloatArray = field(kw_only=True)
 
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def take(self, which: Any) -> ControlPoints:
-        """Return the rows that the index or mask `which` selects."""
-        return replace(self, points=self.points.take(which), height_m=self.height_m[which])
+    @classmethod
+    def of(cls, points: TiePoints, height_m: FloatArray, crs: CRS) -> ControlPoints:
+        """Return points with their heights, on a map."""
+        return cls(**{**vars(points), "crs": crs, "height_m": height_m})
 
     @property
     def by_hand(self) -> int:
         """How many of the points a person moved or added."""
-        return int(self.points.edited.sum())
+        return int(self.edited.sum())
 
     @property
     def lon_lat(self) -> FloatArray:
         """Longitude and latitude, shape (n, 2)."""
-        return reproject(self.points.reference_xy, self.crs, LON_LAT)
+        return reproject(self.reference_xy, self.crs, LON_LAT)
 
     def seen_by(self, rpc: RPC, size: tuple[int, int]) -> Control:
         """Return the points as RPCs see them."""
         return Control(
             rpc.project(self.lon_lat, self.height_m),
-            self.points.input_px,
-            self.points.covariance_px2,
+            self.input_px,
+            self.covariance_px2,
             size,
         )
 
@@ -110,21 +104,19 @@ class ControlPoints:
         if Path(path).suffix.lower() == GEOREFERENCER:
             with writing(path):
                 # It has places in the image where the image's own grid has them.
-                write_georeferencer(Path(path), self.points, transform, grid)
+                write_georeferencer(Path(path), self, transform, grid)
             return
-        covariance = self.points.covariance_px2
+        covariance = self.covariance_px2
         sigma = np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
-        more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma, **self.points.more}
-        write_tie_points(path, replace(self.points, more=more), transform)
+        more = {HEIGHT: self.height_m, CORRELATION: covariance[:, 0, 1] / sigma, **self.more}
+        write_tie_points(path, replace(self, more=more), transform)
 
     def _gdal_options(self) -> str:
         """Return the used points of the fit as options of gdal_translate."""
-        kept = self.take(self.points.fit)
+        kept = self.take(self.fit)
         lines = [f"-a_srs {_word(self.crs)}"]
-        px = kept.points.input_px + GDAL_FIRST
-        for (col, row), (x, y), height in zip(
-            px, kept.points.reference_xy, kept.height_m, strict=True
-        ):
+        px = kept.input_px + GDAL_FIRST
+        for (col, row), (x, y), height in zip(px, kept.reference_xy, kept.height_m, strict=True):
             lines.append(f"-gcp {col:.6f} {row:.6f} {x:.17g} {y:.17g} {height:.4f}")
         return "\n".join(lines) + "\n"
 
@@ -190,7 +182,7 @@ def read_control_points(
         more={EDITED: stored.more[EDITED]} if EDITED in stored.more else {},
         states_fit=stored.states_fit,
     )
-    return ControlPoints(points, np.where(np.isfinite(height), height, 0.0), crs)
+    return ControlPoints.of(points, np.where(np.isfinite(height), height, 0.0), crs)
 
 
 def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:

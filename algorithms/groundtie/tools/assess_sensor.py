@@ -104,9 +104,9 @@ def assess_sensor(
         points = read_control_points(
             check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
-        if not points.points.used.any():
+        if not points.used.any():
             raise TooFewPointsError(f"{check_points} holds no points that are used")
-        points = points.take(points.points.independent)
+        points = points.take(points.independent)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points}: {NONE_HELD_OUT}")
         errors = {BEFORE: SensorErrors.of(oriented.orientation.rpc, points)}
