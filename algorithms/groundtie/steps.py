@@ -31,7 +31,6 @@ from .rasters.patch import Patch
 from .rasters.reading import open_raster
 from .registration.opening import open_pair
 from .registration.pipeline import judge_estimate, mask_pair
-from .registration.scene import SceneInfo
 from .registration.specification import COREGISTER, Specification
 from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
@@ -263,9 +262,7 @@ def _stages(
         bounded_cache(),
         open_pair(reference, input, spec, running.quiet()) as opened,
     ):
-        scene = SceneInfo.of(opened.pair, spec.radar)
-        masked = mask_pair(opened, spec, scene, running.quiet())
-        yield Stages.of(opened.images, masked, spec), running
+        yield Stages.of(opened.images, mask_pair(opened, spec, running.quiet()), spec), running
 
 
 def _is_constant(window: Patch) -> bool:

@@ -183,7 +183,7 @@ def test_a_towns_ground_is_found_once_and_matched_by_one_joint_histogram(
     found = counting(monkeypatch)
     with open_pair(*town, COREGISTER, context) as pair:
         scene = SceneInfo.of(pair.pair, COREGISTER.radar)
-        masked = mask_pair(pair, COREGISTER, scene, context)
+        masked = mask_pair(pair, COREGISTER, context, scene)
         assert masked.used.kind == "ground" and masked.used.leaves_little
         assert Counter(name for name, _ in found)["find_ground"] == 1
         stages = Stages.of(pair.images, masked, COREGISTER)
@@ -210,7 +210,7 @@ def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Cont
     for name, kind in fits.items():
         spec = Specification(name)
         with open_pair(textured.reference, textured.input, spec, context) as pair:
-            masked = mask_pair(pair, spec, SceneInfo.of(pair.pair), context)
+            masked = mask_pair(pair, spec, context, SceneInfo.of(pair.pair))
             stages = Stages.of(pair.images, masked, spec)
             assert isinstance(stages.fit, kind)
             if not isinstance(stages.fit, SurfaceFit):
@@ -231,7 +231,7 @@ def test_tries_count_against_agreement_by_chance(
     spec = replace(COREGISTER, tries=tries)
     with open_pair(textured.reference, textured.input, spec, context) as pair:
         scene = SceneInfo.of(pair.pair)
-        masked = mask_pair(pair, spec, scene, context)
+        masked = mask_pair(pair, spec, context, scene)
         stages = Stages.of(pair.images, masked, spec)
         found = run(pair, spec, context)
         assert found.evidence is not None and found.check is not None

@@ -23,7 +23,7 @@ from ..errors import (
 from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.models import Model
 from ..masks.used import INPUT
-from ..rasters.grid import FloatArray
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import Image, ImagePair
 from ..rasters.reading import RasterSource
 from ..sensor.control_points import ControlPoints
@@ -31,7 +31,6 @@ from ..sensor.orientation import Orientation, sensor_grid
 from .opening import OpenPair, pair_images
 from .pipeline import begin, mask_pair, register
 from .registration import Registration
-from .scene import SceneInfo
 from .sensor_input import OrientedImage
 from .specification import Specification
 from .stages import Stages
@@ -124,7 +123,7 @@ def match_ground_control(
 
     by = image.orientation
     pair = opened(by, spec)
-    masked = mask_pair(pair, spec, SceneInfo.of(pair.pair, spec.radar), context.part(0.0, 0.1))
+    masked = mask_pair(pair, spec, context.part(0.0, 0.1))
     begun = begin(pair, masked, spec)
     if begun.verdict.rule:
         return GroundControl(begun, None)
@@ -140,14 +139,14 @@ def match_ground_control(
         spec = replace(spec, search_radius_m=_LEFT_PX * pair.pair.grid.pixel_size_m)
         pair = opened(by, spec)
         if masked.used.image == INPUT:
-            masked = mask_pair(pair, spec, SceneInfo.of(pair.pair, spec.radar), context.quiet())
+            masked = mask_pair(pair, spec, context.quiet())
         else:
             masked = masked.on(pair.pair)
     registration = register(pair, masked, spec, context.part(0.4, 1.0))
-    points = registration.tie_points
-    if points is None:
+    evidence, points = registration.evidence, registration.tie_points
+    if evidence is None or points is None:
         return GroundControl(registration, None)
-    to_image = _matching_to_image(pair.pair, by, points.reference_xy)
+    to_image = _matching_to_image(evidence.grid, by, points.reference_xy)
     points = replace(
         points, covariance_px2=to_image @ points.covariance_px2 @ to_image.swapaxes(1, 2)
     )
@@ -156,19 +155,12 @@ def match_ground_control(
     points = points.reject(~np.isfinite(heights), "no height")
     heights = np.where(np.isfinite(heights), heights, 0.0)
     control = ControlPoints.of(points, heights, orientation.crs)
-    return GroundControl(registration, control, _common_in_image(registration, by))
-
-
-def _common_in_image(registration: Registration, orientation: Orientation) -> Common:
-    """Return what displaces all points alike, as seen in the middle of the matched part."""
-    evidence = registration.evidence
-    if evidence is None:
-        return NOTHING_COMMON
-    grid = registration.pair.grid
-    middle = grid.pixel_to_map([grid.centre_px])
-    to_image = _matching_to_image(registration.pair, orientation, middle)[0]
+    # As seen in the middle of the matched part.
+    grid, common = evidence.grid, evidence.common
+    to_image = _matching_to_image(grid, by, grid.pixel_to_map([grid.centre_px]))[0]
     scale = float(np.sqrt(abs(np.linalg.det(to_image))))
-    return Common(to_image @ evidence.common.heights_px, scale * evidence.common.sigma_px)
+    common = Common(to_image @ common.heights_px, scale * common.sigma_px)
+    return GroundControl(registration, control, common)
 
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:
@@ -178,12 +170,12 @@ def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> 
     return np.asarray(np.nanmedian(shifts, axis=0))
 
 
-def _matching_to_image(pair: ImagePair, orientation: Orientation, xy: FloatArray) -> FloatArray:
-    """Return the derivatives of image positions by matching pixels at map positions, (n, 2, 2)."""
-    px = pair.grid.map_to_pixel(xy)
+def _matching_to_image(grid: Grid, orientation: Orientation, xy: FloatArray) -> FloatArray:
+    """Return the derivatives of image positions by pixels of a grid at map positions, (n, 2, 2)."""
+    px = grid.map_to_pixel(xy)
     slopes = [
-        orientation.to_px(pair.grid.pixel_to_map(px + step))
-        - orientation.to_px(pair.grid.pixel_to_map(px - step))
+        orientation.to_px(grid.pixel_to_map(px + step))
+        - orientation.to_px(grid.pixel_to_map(px - step))
         for step in (np.array([0.5, 0.0]), np.array([0.0, 0.5]))
     ]
     return np.nan_to_num(np.stack(slopes, axis=-1))

@@ -46,14 +46,19 @@ def run(
     scene
         What the images are, if that was found before.
     """
-    scene = scene or SceneInfo.of(opened.pair, spec.radar)
     context.update(0.02, "inspecting the images")
-    masked = mask_pair(opened, spec, scene, context.part(0.02, 0.12))
+    masked = mask_pair(opened, spec, context.part(0.02, 0.12), scene)
     return register(opened, masked, spec, context.part(0.12, 1.0))
 
 
-def mask_pair(opened: OpenPair, spec: Specification, scene: SceneInfo, context: Context) -> Masked:
-    """Return the pair with all masks: the user's, and that of the radar image if one is needed."""
+def mask_pair(
+    opened: OpenPair, spec: Specification, context: Context, scene: SceneInfo | None = None
+) -> Masked:
+    """Return the pair with all masks: the user's, and that of the radar image if one is needed.
+
+    Parameters as `run`.
+    """
+    scene = scene or SceneInfo.of(opened.pair, spec.radar)
     if spec.surface is not None:
         return with_surface_mask(opened.pair, scene, spec.surface, opened.stack, context)
     if opened.user_mask is not None:
