@@ -90,7 +90,7 @@ def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
         dem_datum="ellipsoidal",
         model="shift_drift",
     )
-    assert "part.tif above ellipsoidal, which covers" in result.ground
+    assert "part.tif above ellipsoidal, which covers" in result.image.heights
     assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0
 
 

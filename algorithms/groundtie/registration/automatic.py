@@ -23,11 +23,12 @@ from .asked import USUAL, asked_lights, asked_rendering, asked_surface_view, ask
 from .delivery import Call
 from .orthorectification import write_orthoimage
 from .pipeline import run
+from .refinement import RefinedRpc
 from .refinement_output import RefinementFiles, WriteOutput
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import Ground, OrientedImage
-from .sensor_jobs import RefinedRpc, refine_into
+from .sensor_jobs import refine_into
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.

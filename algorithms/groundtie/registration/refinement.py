@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -11,18 +12,22 @@ import numpy as np
 
 from ..assessment.point_errors import PointErrors
 from ..assessment.statistics import Statistics
+from ..declaration import file_lines
 from ..errors import NotRegisteredError, TooFewPointsError
 from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
+from ..masks.used import MaskUsed
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
 from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control, adjust
 from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
+from ..sensor.heights import ConstantHeight, Heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
 from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, hull_share
+from .ground_control import GroundControl
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge, judge_search
 
@@ -146,8 +151,8 @@ class RefinementEvidence:
 
 
 @dataclass(frozen=True)
-class Refinement:
-    """A bias that was estimated from ground control, and judged.
+class RefinedRpc:
+    """RPCs that were refined by ground control, and judged.
 
     Parameters
     ----------
@@ -156,11 +161,17 @@ class Refinement:
     points
         The ground control; blunders are rejected.
     fit
-        RPCs with the bias folded in.
+        The RPCs, with the bias folded in, and how far they miss it.
     evidence
         What the verdict rests on: the points as the delivered RPCs see them, and the bias.
     verdict
         Whether the refined RPCs can be trusted.
+    heights
+        What contradicts the heights.
+    mask
+        Which mask points were matched with; None: they were given.
+    files
+        What was written, by name.
     """
 
     image: OrientedImage
@@ -168,6 +179,9 @@ class Refinement:
     fit: RPCFit
     evidence: RefinementEvidence
     verdict: Verdict
+    heights: HeightCheck
+    mask: MaskUsed | None
+    files: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -176,9 +190,8 @@ class Refinement:
         image: OrientedImage,
         model: str,
         max_error_px: float,
-        is_measured: bool = False,
-        common: Common = NOTHING_COMMON,
-    ) -> Refinement:
+        found: GroundControl | None,
+    ) -> RefinedRpc:
         """Estimate the bias by the points of the fit that are used, and judge it.
 
         Parameters
@@ -191,10 +204,8 @@ class Refinement:
             As `adjust` takes it.
         max_error_px
             Largest root mean square error at held-out points.
-        is_measured
-            Whether somebody measured the points, who were not matched.
-        common
-            What displaces all points alike, in pixels of the image, as far as it is known.
+        found
+            The matching that the points come from; None: somebody measured them.
 
         Raises
         ------
@@ -212,7 +223,7 @@ class Refinement:
             raise _refused(image, verdict) from error
         blunders = np.zeros(len(points), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
-        needs_spread = not (is_measured and model == SHIFT)
+        needs_spread = found is not None or model != SHIFT
         fit = fold(rpc, adjustment.bias)
         evidence = RefinementEvidence(
             control,
@@ -222,10 +233,18 @@ class Refinement:
             max_error_px,
             fit.largest_residual_px,
             needs_spread,
-            common,
+            NOTHING_COMMON if found is None else found.common,
         )
         kept = points.reject(blunders, "blunder")
-        return cls(image, kept, fit, evidence, judge(evidence))
+        above = _median_above(kept, image.orientation.heights) if found is None else None
+        heights = check_heights(image.orientation, control, adjustment, above)
+        mask = None if found is None else found.registration.mask
+        return cls(image, kept, fit, evidence, judge(evidence), heights, mask)
+
+    @property
+    def adjustment(self) -> Adjustment:
+        """The bias, as it was estimated."""
+        return self.evidence.adjustment
 
     @property
     def grid(self) -> Grid:
@@ -237,7 +256,7 @@ class Refinement:
 
         Without check points, those are shown for them that points have when they are left out.
         """
-        control, adjustment = self.evidence.control, self.evidence.adjustment
+        control, adjustment = self.evidence.control, self.adjustment
         fitted, held_out = control.residuals_px(adjustment.bias), self.evidence.check
         if held_out is None:
             held_out, missed = control, adjustment.left_out_px
@@ -250,33 +269,56 @@ class Refinement:
             np.append(adjustment.used, np.ones(len(missed), bool)),
         )
 
-    def accepted(self) -> RPCFit:
-        """Return the RPCs with the bias folded in.
-
-        Raises
-        ------
-        NotRegisteredError
-            The refinement is refused.
-        """
+    def require_accepted(self) -> None:
+        """Raise `NotRegisteredError` if it was refused."""
         if not self.verdict.accepted:
             raise _refused(self.image, self.verdict)
-        return self.fit
 
-    def heights(self, own_heights: bool) -> HeightCheck:
-        """Return what contradicts the heights.
+    def summary(self) -> dict[str, Any]:
+        """Return the result as values that JSON can carry."""
+        return {
+            "verdict": self.verdict.summary() | self.evidence.summary(),
+            "points_by_hand": self.points.by_hand,
+            "bias": self.adjustment.bias.to_json(),
+            "left_out_rmse_px": self.adjustment.left_out_rmse_px,
+            "folding_residual_px": self.fit.largest_residual_px,
+            "heights": {"used": self.image.heights, **self.heights.summary()},
+            "mask": None if self.mask is None else self.mask.summary(),
+            "files": self.files,
+        }
 
-        With `own_heights` the points have heights of their own, which are compared.
-        """
-        above = self._median_above() if own_heights else None
-        control, adjustment = self.evidence.control, self.evidence.adjustment
-        return check_heights(self.image.orientation, control, adjustment, above)
+    def lines(self) -> list[str]:
+        """Return the result as lines of text."""
+        verdict, evidence, bias = self.verdict, self.evidence, self.adjustment.bias
+        shift, sigma = bias.shift_px()
+        by_hand = self.points.by_hand
+        return [
+            f"accepted: {verdict.reason}",
+            f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
+            f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
+            f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
+            f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "
+            f"{evidence.after.rmse:.2f} px after",
+            verdict.accuracy_line(),
+            f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
+            *([f"set by hand: {by_hand} points"] if by_hand else []),
+            self.image.heights,
+            *(() if self.mask is None else (self.mask.line(),)),
+            *(f"warning: {line}" for line in self.heights.warnings()),
+            *file_lines(self.files),
+        ]
 
-    def _median_above(self) -> float | None:
-        """Return how far points that have heights of their own lie above the ground."""
-        points = self.points
-        above = points.height_m - self.image.orientation.heights.at(points.lon_lat)
-        above = above[np.isfinite(above) & points.used]
-        return float(np.median(above)) if len(above) else None
+
+def _median_above(points: ControlPoints, heights: Heights) -> float | None:
+    """Return how far points that have heights of their own lie above a terrain model.
+
+    None: there is none, or they have no heights.
+    """
+    if isinstance(heights, ConstantHeight):
+        return None
+    above = points.height_m - heights.at(points.lon_lat)
+    above = above[np.isfinite(above) & points.used]
+    return float(np.median(above)) if len(above) else None
 
 
 def _refused(image: OrientedImage, verdict: Verdict) -> NotRegisteredError:

@@ -20,13 +20,12 @@ from ..rasters.grid import FloatArray
 from ..rasters.reading import RasterSource
 from ..report.refinement_report import RefinementReport
 from ..sensor.control_points import ControlPoints
-from ..sensor.height_check import HeightCheck
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_files import write_rpc
 from ..sensor.rpc_fit import RPCFit
 from ..sensor.rpc_tags import rpc_to_tags
 from .ground_control import GroundControl
-from .refinement import Refinement
+from .refinement import RefinedRpc
 from .sensor_input import OrientedImage
 
 # Writes what refined RPCs make of an image.
@@ -88,21 +87,13 @@ class RefinementFiles:
             replace(found.registration, parameters=self.parameters).report(self.report)
         return found.accepted()
 
-    def write(
-        self,
-        refinement: Refinement,
-        heights: HeightCheck,
-        found: GroundControl | None,
-        progress: Progress,
-    ) -> RPCFit:
-        """Write all files and return the refined RPCs; of a refused refinement the report alone.
+    def write(self, refined: RefinedRpc, found: GroundControl | None, progress: Progress) -> None:
+        """Write all files; of a refused refinement the report alone.
 
         Parameters
         ----------
-        refinement
+        refined
             What was estimated.
-        heights
-            What contradicts the heights.
         found
             The matching that the points come from; None: they were given.
         progress
@@ -113,29 +104,24 @@ class RefinementFiles:
         NotRegisteredError
             The refinement is refused.
         """
-        image, accepted = refinement.image, refinement.verdict.accepted
+        image = refined.image
         with Outputs() as outputs:
-            if accepted:
-                fit = refinement.accepted()
-                self.write_output(image, fit, outputs.stage(self.output), progress)
+            if refined.verdict.accepted:
+                self.write_output(image, refined.fit, outputs.stage(self.output), progress)
                 if self.residuals is not None:
-                    by_refined = replace(image.orientation, rpc=fit.rpc)
+                    by_refined = replace(image.orientation, rpc=refined.fit.rpc)
                     staged = outputs.stage(self.residuals)
-                    refinement.points.write(staged, by_refined, image.source.grid)
+                    refined.points.write(staged, by_refined, image.source.grid)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                self._page(refinement, heights, found).write(outputs, self.report)
-        return refinement.accepted()
+                self._page(refined, found).write(outputs, self.report)
+        refined.require_accepted()
 
-    def _page(
-        self, refinement: Refinement, heights: HeightCheck, found: GroundControl | None
-    ) -> RefinementReport:
+    def _page(self, refined: RefinedRpc, found: GroundControl | None) -> RefinementReport:
         return RefinementReport(
-            refinement,
-            heights,
-            None if found is None else _compared(refinement, found),
-            None if found is None else found.registration.mask,
-            title=f"RPCs of {Path(refinement.image.source.path).name}, refined",
+            refined,
+            None if found is None else _compared(refined, found),
+            title=f"RPCs of {Path(refined.image.source.path).name}, refined",
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
@@ -185,10 +171,10 @@ def require_place(source: RasterSource, output: Path | None, *more: Path | None)
         )
 
 
-def _compared(refinement: Refinement, found: GroundControl) -> Comparison:
+def _compared(refined_rpc: RefinedRpc, found: GroundControl) -> Comparison:
     """Draw the reference and the image on the map, as delivered and as refined."""
-    pair, image = found.registration.pair, refinement.image
-    bias = refinement.evidence.adjustment.bias
+    pair, image = found.registration.pair, refined_rpc.image
+    bias = refined_rpc.adjustment.bias
     delivered = replace(image.source, grid=sensor_grid(image.source, image.orientation))
     pair = replace(pair, input=replace(pair.input, source=delivered))
 

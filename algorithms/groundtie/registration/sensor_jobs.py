@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..context import Context, threads
-from ..declaration import file_lines
 from ..errors import ParameterError
-from ..geometry.accuracy import NOTHING_COMMON
 from ..masks.used import MaskUsed
 from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import open_raster
-from ..sensor.adjustment import Adjustment
 from ..sensor.control_points import ControlPoints, read_control_points
-from ..sensor.height_check import HeightCheck
-from ..sensor.rpc_fit import RPCFit
 from .asked import asked_masks, searched
 from .ground_control import GroundControl, match_ground_control, require_crs
-from .refinement import Refinement, RefinementEvidence
+from .refinement import RefinedRpc
 from .refinement_output import RefinementFiles, require_place
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
@@ -79,76 +74,6 @@ class GcpResult:
         ]
 
 
-@dataclass(frozen=True)
-class RefinedRpc:
-    """Refined RPCs, and how far to trust them.
-
-    Parameters
-    ----------
-    fit
-        The RPCs, with the bias folded in, and how far they miss it.
-    adjustment
-        The bias.
-    evidence
-        What the verdict rests on, with the errors before and after.
-    verdict
-        Whether they can be trusted.
-    heights
-        What contradicts the heights.
-    ground
-        Which heights were used, in words.
-    mask
-        Which mask points were matched with; None: they were given.
-    by_hand
-        How many of the points a person moved or added.
-    files
-        What was written, by name.
-    """
-
-    fit: RPCFit
-    adjustment: Adjustment
-    evidence: RefinementEvidence
-    verdict: Verdict
-    heights: HeightCheck
-    ground: str
-    mask: MaskUsed | None
-    by_hand: int
-    files: dict[str, str]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        return {
-            "verdict": self.verdict.summary() | self.evidence.summary(),
-            "points_by_hand": self.by_hand,
-            "bias": self.adjustment.bias.to_json(),
-            "left_out_rmse_px": self.adjustment.left_out_rmse_px,
-            "folding_residual_px": self.fit.largest_residual_px,
-            "heights": {"used": self.ground, **self.heights.summary()},
-            "mask": None if self.mask is None else self.mask.summary(),
-            "files": self.files,
-        }
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        verdict, evidence, bias = self.verdict, self.evidence, self.adjustment.bias
-        shift, sigma = bias.shift_px()
-        return [
-            f"accepted: {verdict.reason}",
-            f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
-            f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
-            f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
-            f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "
-            f"{evidence.after.rmse:.2f} px after",
-            verdict.accuracy_line(),
-            f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
-            *([f"set by hand: {self.by_hand} points"] if self.by_hand else []),
-            self.ground,
-            *(() if self.mask is None else (self.mask.line(),)),
-            *(f"warning: {line}" for line in self.heights.warnings()),
-            *file_lines(self.files),
-        ]
-
-
 def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpResult:
     """Extract ground control as the tool `extract_gcps` does, from its parameters by name.
 
@@ -188,7 +113,7 @@ def refine_into(
     files: RefinementFiles, parameters: Mapping[str, Any], progress: Progress
 ) -> RefinedRpc:
     """Refine RPCs as `refine`, and write files that need not be those of the parameters."""
-    gcps, dem = parameters["gcps"], parameters["dem"]
+    gcps = parameters["gcps"]
     if (parameters["reference"] is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
@@ -200,29 +125,12 @@ def refine_into(
         else:
             points = files.points_or_report(found)
         context.update(0.9, "estimating the bias")
-        refinement = Refinement.of(
-            points,
-            sensor,
-            parameters["model"],
-            parameters["max_error"],
-            is_measured=gcps is not None,
-            common=NOTHING_COMMON if found is None else found.common,
-        )
-        heights = refinement.heights(own_heights=gcps is not None and dem is not None)
-        for warning in heights.warnings():
+        model, max_error_px = parameters["model"], parameters["max_error"]
+        refined = RefinedRpc.of(points, sensor, model, max_error_px, found)
+        for warning in refined.heights.warnings():
             context.update(0.9, warning)
-        fit = files.write(refinement, heights, found, context.part(0.9, 1.0).progress)
-    return RefinedRpc(
-        fit,
-        refinement.evidence.adjustment,
-        refinement.evidence,
-        refinement.verdict,
-        heights,
-        sensor.heights,
-        None if found is None else found.registration.mask,
-        points.by_hand,
-        files.written(),
-    )
+        files.write(refined, found, context.part(0.9, 1.0).progress)
+    return replace(refined, files=files.written())
 
 
 def _matched(

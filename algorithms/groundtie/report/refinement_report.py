@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..assessment.comparison import Comparison
-from ..masks.used import MaskUsed
-from ..registration.refinement import Refinement
-from ..sensor.height_check import HeightCheck
+from ..registration.refinement import RefinedRpc
 from . import figures
 from .page import Page
 
@@ -19,41 +17,31 @@ class RefinementReport(Page):
 
     Parameters
     ----------
-    refinement
+    refined
         The RPCs and the verdict on them.
-    heights
-        What makes the heights doubtful.
     comparison
         Reference and image on the map; None: there is no reference.
-    mask
-        What of the reference took part; None without one.
     """
 
-    refinement: Refinement
-    heights: HeightCheck
+    refined: RefinedRpc
     comparison: Comparison | None
-    mask: MaskUsed | None
     template: ClassVar[str] = "refinement.html.j2"
 
     def numbers(self) -> dict[str, Any]:
         """Return what was measured, by name."""
-        found = self.refinement
+        found = self.refined
         return {
             "verdict": found.verdict.summary() | found.evidence.summary(),
-            "bias": found.evidence.adjustment.bias.to_json(),
+            "bias": found.adjustment.bias.to_json(),
             "points_by_hand": found.points.by_hand,
-            "heights": {"used": found.image.heights, "warnings": self.heights.warnings()},
-            "mask": None if self.mask is None else self.mask.summary(),
+            "heights": {"used": found.image.heights, "warnings": found.heights.warnings()},
+            "mask": None if found.mask is None else found.mask.summary(),
         }
 
     def values(self) -> dict[str, Any]:
         """Return what the template shows."""
-        found, verdict, evidence = (
-            self.refinement,
-            self.refinement.verdict,
-            self.refinement.evidence,
-        )
-        residuals, grid, bias = found.residuals(), found.grid, evidence.adjustment.bias
+        found, verdict, evidence = self.refined, self.refined.verdict, self.refined.evidence
+        residuals, grid, bias = found.residuals(), found.grid, found.adjustment.bias
         measured = {"before": evidence.before, "after": evidence.after}
         return {
             "verdict": verdict,
@@ -65,7 +53,7 @@ class RefinementReport(Page):
             "bias": bias,
             "shift": list(zip(("column", "row"), *bias.shift_px(), strict=True)),
             "facts": self._facts(),
-            "warnings": self.heights.warnings(),
+            "warnings": found.heights.warnings(),
             **figures.shown_residuals(residuals, grid),
             **figures.shown_errors(residuals, verdict, evidence.metres_per_px),
             "grid": grid,
@@ -73,6 +61,7 @@ class RefinementReport(Page):
         }
 
     def _facts(self) -> list[str]:
-        found, count = self.refinement, self.refinement.points.by_hand
+        found, count = self.refined, self.refined.points.by_hand
         by_hand = [f"points set by hand: {count}"] if count else []
-        return [found.image.heights, *by_hand, *([] if self.mask is None else [self.mask.line()])]
+        mask = [] if found.mask is None else [found.mask.line()]
+        return [found.image.heights, *by_hand, *mask]

@@ -9,7 +9,8 @@ from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..kinds import AUTO, GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..progress import SILENT, Progress
-from ..registration.sensor_jobs import RefinedRpc, refine
+from ..registration.refinement import RefinedRpc
+from ..registration.sensor_jobs import refine
 from ..sensor.bias import KINDS
 from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
 from .parameters import general, registration, sensor
