@@ -101,8 +101,8 @@ def evidence(
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
     surveys = Surveys(survey, rest, ground)
-    more = {"scene": scene(), **more}
-    return RegistrationEvidence(estimate, check, GRID, max_error_px, surveys=surveys, **more)
+    images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
+    return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 
 
 def survey(

@@ -22,6 +22,7 @@ from evidences import (
     survey,
 )
 
+from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey
 from groundtie.matching.survey import Survey
@@ -52,7 +53,8 @@ def posed(
         fitted.transform,
         **{"fold_models": fitted.fold_models, **more},
     )
-    return PoseSurveyEvidence(found, scene(), layover_factor, is_shift)
+    images = scene(), MaskUsed.none(""), POSE_TOLERANCE_PX
+    return PoseSurveyEvidence(*images, found, layover_factor, is_shift)
 
 
 def fallen_beyond(count: int) -> np.ndarray:

@@ -41,7 +41,8 @@ LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:
     estimate = estimate or estimated(fit_points())
-    return judge(RegistrationEvidence(estimate, check, GRID, max_error, scene()))
+    images = scene(), MaskUsed.none(""), max_error
+    return judge(RegistrationEvidence(*images, estimate, check, GRID))
 
 
 @pytest.mark.parametrize("sigma", [0.2, 0.7, 1.2])

@@ -48,7 +48,7 @@ class Evidence(Protocol):
 
 @dataclass(frozen=True)
 class ImagesEvidence:
-    """What is known of a pair before anything is matched.
+    """What is known of a pair before anything is matched, and is asked of what matched, too.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class ImagesEvidence:
     mask: MaskUsed
     max_error_px: float
 
-    stages: ClassVar = (BANDS, IMAGES)
+    stages: ClassVar[Collection[str]] = (BANDS, IMAGES)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class EvidenceOfPoints(Evidence, Protocol):
 
 
 @dataclass(frozen=True)
-class RegistrationEvidence:
+class RegistrationEvidence(ImagesEvidence):
     """What is known of a registration that came as far as check points.
 
     Parameters
@@ -216,17 +216,11 @@ class RegistrationEvidence:
         Check points, searched for around what the transform predicts.
     grid
         The matching grid, cut to the overlap.
-    max_error_px
-        Largest root mean square error at check points, in matching pixels.
-    scene
-        What the images are.
     tries
         How many registrations were tried, any of which might agree by chance.
     layover_factor
         How many times what heights scatter matched points by, they displace the model; None: not
         two radar images.
-    mask
-        The mask that was used.
     surveys
         What chips all over the overlap show.
     input_fit
@@ -238,11 +232,8 @@ class RegistrationEvidence:
     estimate: Estimate
     check: TiePoints
     grid: Grid
-    max_error_px: float
-    scene: SceneInfo
     tries: int = 1
     layover_factor: float | None = None
-    mask: MaskUsed = field(default_factory=lambda: MaskUsed.none(""))
     surveys: Surveys = field(default_factory=Surveys)
     input_fit: ModelFit | None = None
     exchanged: Agreement | None = None

@@ -26,7 +26,7 @@ from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, PoseWindows
 from ..pose.search import find_poses, moved_px
 from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
-from .evidence import AGREEMENT, BANDS, ERROR, POSE, SURVEY, Agreement, hull_share
+from .evidence import AGREEMENT, BANDS, ERROR, POSE, SURVEY, Agreement, ImagesEvidence, hull_share
 from .layover import CHIPS_MEAN_OVER_SCATTER, mean_of_heights_px
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
@@ -114,15 +114,13 @@ class PoseEvidence:
 
 
 @dataclass(frozen=True)
-class PoseSurveyEvidence:
+class PoseSurveyEvidence(ImagesEvidence):
     """What chips all over a pair show of a pose that a search found.
 
     Parameters
     ----------
     found
         What they show.
-    scene
-        What the images are.
     layover_factor
         See `RegistrationEvidence`.
     is_shift
@@ -130,7 +128,6 @@ class PoseSurveyEvidence:
     """
 
     found: PoseSurvey
-    scene: SceneInfo
     layover_factor: float | None = None
     is_shift: bool = False
 
@@ -139,8 +136,6 @@ class PoseSurveyEvidence:
     # The pose is what a search found; chips all over are none that it was fitted to.
     fit_points: ClassVar = 0
     fit_points_used: ClassVar = 0
-    mask: ClassVar = MaskUsed.none("a pose is searched for without a mask")
-    max_error_px: ClassVar = POSE_TOLERANCE_PX
 
     @property
     def metres_per_px(self) -> float | None:
@@ -210,6 +205,8 @@ def confirm_pose(
     moved = windows.pose(found.transform)
     grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)
     is_shift = moved_px(moved, shift, (grid.height, grid.width)) <= POSE_TOLERANCE_PX
-    verdict = judge(PoseSurveyEvidence(found, scene, factor, is_shift))
+    mask = MaskUsed.none("a pose is searched for without a mask")
+    evidence = PoseSurveyEvidence(scene, mask, POSE_TOLERANCE_PX, found, factor, is_shift)
+    verdict = judge(evidence)
     # What the chips confirm is where they have moved it.
     return verdict, moved if verdict.accepted else pose

@@ -146,16 +146,16 @@ class Stages:
             else CHIPS_MEAN_OVER_SCATTER
         )
         return RegistrationEvidence(
+            scene,
+            self.masked.used,
+            self.spec.largest_error_px,
             estimate,
             check.points,
             self.masked.pair.grid,
-            self.spec.largest_error_px,
-            scene,
             self.spec.tries,
             factor if is_radar else None,
-            self.masked.used,
             surveys,
-            input_fit=self._input_fit(estimate),
+            self._input_fit(estimate),
         )
 
     def _input_fit(self, estimate: Estimate) -> ModelFit | None:

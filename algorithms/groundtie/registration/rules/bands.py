@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ...masks.used import INPUT, REFERENCE
-from ..evidence import ImagesEvidence, RegistrationEvidence
+from ..evidence import ImagesEvidence
 from .rule import Rule
 
-if TYPE_CHECKING:
-    from ..pose_verdict import PoseSurveyEvidence
 
-
-def _bands_apart(
-    evidence: ImagesEvidence | RegistrationEvidence | PoseSurveyEvidence,
-) -> str | None:
+def _bands_apart(evidence: ImagesEvidence) -> str | None:
     scene = evidence.scene
     # A chosen band of the reference is matched alone; of the input, all are registered.
     sought = {INPUT: scene.input}

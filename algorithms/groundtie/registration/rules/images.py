@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ...masks.used import LAYER, SURFACE
-from ..evidence import ImagesEvidence, RegistrationEvidence
+from ..evidence import ImagesEvidence
 from .rule import ON_GROUND, Rule
 
 
-def _ground_not_found(evidence: ImagesEvidence | RegistrationEvidence) -> str | None:
+def _ground_not_found(evidence: ImagesEvidence) -> str | None:
     scene = evidence.scene
     if evidence.mask.kind in (LAYER, SURFACE):
         return None
