@@ -164,8 +164,7 @@ def _first_accepted(
             if verdict.is_final:
                 break
         chosen = found[-1] if found[-1].verdict.is_final else found[0]
-        chosen = replace(chosen, tried=tuple(tried), parameters=call.parameters or {})
-        return chosen, stack.pop_all()
+        return replace(chosen, tried=tuple(tried)), stack.pop_all()
 
 
 def _needs_rpcs(raster: Any) -> bool:

@@ -6,7 +6,7 @@ import contextlib
 import weakref
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +124,7 @@ class Call:
     files: RegistrationFiles
     bands: tuple[int | None, int | None] = (None, None)
     masks: tuple[Any, Any] = (None, None)
-    parameters: Mapping[str, Any] | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     workers: int | None = None
     progress: Progress = SILENT
 
@@ -164,7 +164,6 @@ class Call:
             context.update(0.0, "opening the images")
             opened = stack.enter_context(self.open(spec, context.part(0.0, 0.02)))
             found = run(opened, spec, context.part(0.02, 0.7))
-            found = replace(found, parameters=self.parameters or {})
             return self.deliver(found, context.part(0.7, 1.0), stack.pop_all())
 
     def open(
@@ -197,7 +196,8 @@ class Call:
             It was refused; its report is written.
         """
         with stack:
-            registration = replace(registration, beyond=self.files.beyond(registration))
+            beyond = self.files.beyond(registration)
+            registration = replace(registration, parameters=self.parameters, beyond=beyond)
             self.files.write(registration, context)
             registration.require_accepted()
             rasters = stack.pop_all()

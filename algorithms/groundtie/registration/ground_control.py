@@ -150,11 +150,8 @@ def match_ground_control(
     points = replace(
         points, covariance_px2=to_image @ points.covariance_px2 @ to_image.swapaxes(1, 2)
     )
-    orientation = image.orientation
-    heights = orientation.heights_at(points.reference_xy)
-    points = points.reject(~np.isfinite(heights), "no height")
-    heights = np.where(np.isfinite(heights), heights, 0.0)
-    control = ControlPoints.of(points, heights, orientation.crs)
+    heights = image.orientation.heights_at(points.reference_xy)
+    control = ControlPoints.of(points, heights, image.orientation.crs)
     # As seen in the middle of the matched part.
     grid, common = evidence.grid, evidence.common
     to_image = _matching_to_image(grid, by, grid.pixel_to_map([grid.centre_px]))[0]

@@ -55,8 +55,10 @@ class ControlPoints(TiePoints):
 
     @classmethod
     def of(cls, points: TiePoints, height_m: FloatArray, crs: CRS) -> ControlPoints:
-        """Return points with their heights, on a map."""
-        return cls(**{**vars(points), "crs": crs, "height_m": height_m})
+        """Return points of a map with heights, shape (n,); those of unknown height are rejected."""
+        is_known = np.isfinite(height_m)
+        known = vars(points.reject(~is_known, "no height"))
+        return cls(**{**known, "crs": crs, "height_m": np.where(is_known, height_m, 0.0)})
 
     @property
     def by_hand(self) -> int:
@@ -171,8 +173,7 @@ def read_control_points(
         )
     lon_lat = reproject(stored.reference_xy, crs, LON_LAT)
     height = np.where(np.isfinite(height), height, orientation.heights.at(lon_lat))
-    state = np.where(stored.used, USED, "rejected: in the file").astype(object)
-    state[stored.used & ~np.isfinite(height)] = "rejected: no height"
+    state = np.where(stored.used, USED, "rejected: in the file")
     unknown = np.full(len(stored), np.nan)
     spread = (stored.more.get(name, unknown) for name in (*SIGMA, CORRELATION))
     points = replace(
@@ -182,7 +183,7 @@ def read_control_points(
         more={EDITED: stored.more[EDITED]} if EDITED in stored.more else {},
         states_fit=stored.states_fit,
     )
-    return ControlPoints.of(points, np.where(np.isfinite(height), height, 0.0), crs)
+    return ControlPoints.of(points, height, crs)
 
 
 def _covariances(x: FloatArray, y: FloatArray, correlation: FloatArray) -> FloatArray:
