@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rasterio.crs import CRS
 
 from ..context import Context
 from ..errors import (
-    GeoreferencingError,
     NothingFoundError,
     TooFewPointsError,
 )
@@ -73,19 +71,6 @@ class GroundControl:
         self.registration.require_accepted("matched with")
         assert self.points is not None
         return self.points
-
-
-def require_crs(reference: RasterSource) -> CRS:
-    """Return a reference's CRS: RPCs lead to longitude and latitude.
-
-    Raises
-    ------
-    GeoreferencingError
-        It has none.
-    """
-    if reference.grid.crs is None:
-        raise GeoreferencingError(f"{reference.path} has no CRS")
-    return reference.grid.crs
 
 
 def match_ground_control(

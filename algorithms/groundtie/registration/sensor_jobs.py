@@ -15,8 +15,9 @@ from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import open_raster
 from ..sensor.control_points import ControlPoints, read_control_points
+from ..sensor.heights import require_crs
 from .asked import asked_masks, searched
-from .ground_control import GroundControl, match_ground_control, require_crs
+from .ground_control import GroundControl, match_ground_control
 from .refinement import RefinedRpc
 from .refinement_output import RefinementFiles, require_place
 from .sensor_input import Ground, OrientedImage, open_oriented_image

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from rasterio.crs import CRS
 
 from ..errors import GeoreferencingError, NoOverlapError, RasterContentError
 from ..rasters.grid import (
@@ -208,6 +209,19 @@ def terrain_heights(
         raise type(error)(f"the geoid cannot be used: {error}") from error
 
 
+def require_crs(source: RasterSource) -> CRS:
+    """Return a raster's CRS: RPCs lead to longitude and latitude.
+
+    Raises
+    ------
+    GeoreferencingError
+        It has none.
+    """
+    if source.grid.crs is None:
+        raise GeoreferencingError(f"{source.path} has no CRS")
+    return source.grid.crs
+
+
 def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     """Return the surface of a raster over a region.
 
@@ -225,15 +239,12 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     NoOverlapError, RasterContentError
         See `surface_around`.
     """
-    grid = source.grid
-    if grid.crs is None:
-        raise GeoreferencingError(f"{source.path} has no CRS")
-
+    grid, crs = source.grid, require_crs(source)
     corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
     middle, own_middle = (corner + opposite)[0] / 2, grid.pixel_to_map([grid.centre_px])[0, 0]
 
     def exact(places: FloatArray) -> FloatArray:
-        xy = near_longitude(reproject(places, LON_LAT, grid.crs), own_middle, grid.crs)
+        xy = near_longitude(reproject(places, LON_LAT, crs), own_middle, crs)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
     surface = surface_around(source, exact, lon_lat, fill_open=False)

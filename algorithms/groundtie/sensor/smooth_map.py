@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,40 +26,12 @@ _PRODUCTS = tuple(
 _TERMS = len(_PRODUCTS) + 3
 
 
-@dataclass(frozen=True)
-class SmoothMap:
-    """A polynomial of degree 5 from positions in a box to other positions; NaN outside of it.
-
-    Parameters
-    ----------
-    low, high
-        Corners of the box, shape (2,).
-    coefficients
-        Shape (2, 21).
-    """
-
-    low: FloatArray
-    high: FloatArray
-    coefficients: FloatArray
-
-    def __call__(self, xy: FloatArray) -> FloatArray:
-        """Return the other positions, shape (n, 2), of positions (n, 2)."""
-        moved = np.empty((len(xy), 2))
-
-        def work(part: slice, terms: FloatArray) -> None:
-            unit = (2 * (xy[part] - self.low) / (self.high - self.low) - 1).T
-            fill_terms(unit, terms, _PRODUCTS)
-            moved[part] = (self.coefficients @ terms).T
-            moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
-
-        in_blocks(work, len(xy), terms=_TERMS)
-        return moved
-
-
 def smooth_map(
     exact: PointFunction, low: FloatArray, high: FloatArray, tolerance: float
 ) -> PointFunction:
-    """Return a polynomial that stands in for a function over a box; the function if none is exact.
+    """Return a polynomial of degree 5 in place of a function over a box, or the function itself.
+
+    That where no polynomial is exact. Outside of the box the polynomial is NaN.
 
     Parameters
     ----------
@@ -79,7 +51,23 @@ def smooth_map(
     if not np.isfinite(values).all():
         return exact
     coefficients = np.linalg.lstsq(terms.T, values, rcond=None)[0].T
-    fitted = SmoothMap(low, high, np.ascontiguousarray(coefficients))
+    fitted = partial(_polynomial, low, high, np.ascontiguousarray(coefficients))
     places = (low + high) / 2 + checks.T * (high - low) / 2
     error = np.abs(fitted(places) - exact(places)).max()
     return fitted if error < tolerance else exact
+
+
+def _polynomial(
+    low: FloatArray, high: FloatArray, coefficients: FloatArray, xy: FloatArray
+) -> FloatArray:
+    """Return positions, (n, 2), by coefficients, (2, 21), of positions in a box; NaN elsewhere."""
+    moved = np.empty((len(xy), 2))
+
+    def work(part: slice, terms: FloatArray) -> None:
+        unit = (2 * (xy[part] - low) / (high - low) - 1).T
+        fill_terms(unit, terms, _PRODUCTS)
+        moved[part] = (coefficients @ terms).T
+        moved[part][(np.abs(unit) > 1 + 1e-9).any(axis=0)] = np.nan
+
+    in_blocks(work, len(xy), terms=_TERMS)
+    return moved
