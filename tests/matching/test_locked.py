@@ -160,9 +160,7 @@ def test_lines_are_masked_in_any_colour_over_any_ground(
 
 
 @pytest.mark.slow
-def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
-    tmp_path: Path, context: Context
-) -> None:
+def test_tiles_of_a_mosaic_are_found_in_speckle(tmp_path: Path, context: Context) -> None:
     """Where speckle hides how sharp their edges are."""
     tile = np.searchsorted((45, 130, 240), np.arange(SIDE), side="right") % 2
     gains = np.where(tile, 0.6, 1.2) * np.where(tile, 0.6, 1.2)[:, None]
@@ -175,9 +173,6 @@ def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
     locked = looked_at(tmp_path, reference, input, context, sensors=Sensors.DIFFERENT)
     assert locked is not None and locked.is_evident
     assert not locked.sameness.has_sharp_edges and locked.sameness.has_seams
-    mask = masked(tmp_path, locked)
-    # Columns are counted from 20 on.
-    assert mask[:, 104:116].mean() > 0.9 and mask[124:136].mean() > 0.9
 
 
 @pytest.mark.slow
@@ -273,13 +268,14 @@ def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: 
 def test_views_are_a_little_less_alike_in_coarser_pixels(
     tmp_path: Path, context: Context, coarse: float, is_view: bool
 ) -> None:
-    """Light and seasons differ over wide areas; two radar images have neither."""
+    """Light and seasons differ over wide areas."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None
     sameness = replace(locked.sameness, sharpness=1.5, related=0.0, **OF_ONE_GROUND)
     sameness = replace(sameness, coarse_area=coarse)
     assert replace(locked, sameness=sameness).is_explained == is_view
-    assert sameness.is_finer_than_ground and not sameness.varies_as_ground
+    assert sameness.is_finer_than_ground != is_view
+    assert sameness.varies_as_ground == is_view
 
 
 def test_what_varies_alike_in_two_radar_images_is_no_ground(
@@ -303,9 +299,7 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     views = replace(locked.sameness, sharpness=4.2, **OF_ONE_GROUND)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
-    copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)
-    assert copy.is_copy and not copy.is_same_view
-    assert replace(copy, sharpness=0.9 * VIEW_SHARPNESS).is_same_view
+    assert replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS).is_copy
 
 
 @pytest.mark.parametrize(

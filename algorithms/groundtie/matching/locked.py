@@ -17,7 +17,6 @@ from ..context import Context
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
-from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
     LOOK_REACH_PX,
     Look,
@@ -26,7 +25,7 @@ from ..similarity.in_common import (
     sameness_of,
 )
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
-from ..similarity.seams import seams, step_products
+from ..similarity.seams import step_products
 from .chip_windows import ChipWindows, Resampled, singly
 from .matcher import Places
 
@@ -39,9 +38,8 @@ _NEAR_PX = 1.5
 # refused, but some beyond 0.09, and one of the suite series at 0.08.
 EXACT_PX = 0.0625
 
-# Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
+# Around an edge, chips see it this far off.
 _EDGE_SURROUNDINGS_PX = 9
-_SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
 
 
 class Sensors(Enum):
@@ -128,8 +126,6 @@ class LockedContent:
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges or self.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
-            if self.sameness.has_seams:
-                same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
 

@@ -162,9 +162,7 @@ def survey_rest(
     if locked.is_drawn:
         return Rest()
     left = beyond = None
-    same = locked.sameness
-    is_doubtful = same.has_sharp_edges or same.is_finer_than_ground
-    if not locked.is_explained or (is_doubtful and not same.is_same_view):
+    if not locked.is_explained or locked.sameness.has_sharp_edges:
         # Another input leaves something else of the reference.
         once = replace(context, memo=None)
         left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)
