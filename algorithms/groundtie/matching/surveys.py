@@ -23,9 +23,8 @@ class Rest:
     Parameters
     ----------
     survey
-        What they show; None: it is not asked, as of content that is drawn, and of views that are
-        the same nearly everywhere, or whose edges do not coincide sharply, and which are no less
-        alike in coarser pixels.
+        What they show; None: it is not asked, as of content that is drawn, and of copies and views
+        whose edges do not coincide sharply.
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond

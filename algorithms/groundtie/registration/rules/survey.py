@@ -185,9 +185,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "with edges sharper than those of ground, or beside one another; or without it less than a "
         "quarter of the chips is left, a second place matches about as well or is a peak of "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
-        f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, or less alike in "
-        "coarser pixels, a quarter is left that is below that or has such a place, or what the "
-        "reference does not explain of it has one",
+        f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, a quarter is left "
+        "that is below that or has such a place, or what the reference does not explain of it has "
+        "one",
         "suites margins and attacks",
         WITHOUT,
         _locked,
