@@ -299,7 +299,9 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     views = replace(locked.sameness, sharpness=4.2, **OF_ONE_GROUND)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
-    assert replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS).is_copy
+    copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)
+    assert copy.is_copy and not copy.is_same_view
+    assert replace(copy, sharpness=0.9 * VIEW_SHARPNESS).is_same_view
 
 
 @pytest.mark.parametrize(

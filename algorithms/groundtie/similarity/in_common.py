@@ -149,6 +149,11 @@ class Sameness:
         return min(self.area, self.reduced_area, self.coarse_area) >= _COPY_SHARE
 
     @property
+    def is_same_view(self) -> bool:
+        """Whether nearly everything is the same, and edges no sharper than in a camera's views."""
+        return self.is_copy and self.sharpness < VIEW_SHARPNESS
+
+    @property
     def has_one_ground(self) -> bool:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
         return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
