@@ -23,8 +23,8 @@ class Rest:
     Parameters
     ----------
     survey
-        What they show; None: it is not asked, as of content that is drawn, of views that are the
-        same nearly everywhere, and of copies and views whose edges do not coincide sharply.
+        What they show; None: it is not asked, as of content that is drawn, and of copies and views
+        whose edges do not coincide sharply.
     is_explained
         Whether such content needs no confirmation (see `LockedContent`).
     beyond
@@ -161,8 +161,7 @@ def survey_rest(
     if locked.is_drawn:
         return Rest()
     left = beyond = None
-    same = locked.sameness
-    if not locked.is_explained or (same.has_sharp_edges and not same.is_same_view):
+    if not locked.is_explained or locked.sameness.has_sharp_edges:
         # Another input leaves something else of the reference.
         once = replace(context, memo=None)
         left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)

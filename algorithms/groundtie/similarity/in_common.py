@@ -117,8 +117,12 @@ class Sameness:
 
     @property
     def has_sharp_edges(self) -> bool:
-        """Whether edges coincide more sharply than those of one ground."""
-        return self.sharpness >= LEAST_SHARPNESS
+        """Whether edges coincide more sharply than those of one ground.
+
+        Of copies, in whatever colours: than those of one exposure's bands.
+        """
+        is_copy = self.is_copy or self.is_copy_in_other_colours
+        return self.sharpness >= (VIEW_SHARPNESS if is_copy else LEAST_SHARPNESS)
 
     @property
     def has_edges_beside(self) -> bool:
@@ -147,11 +151,6 @@ class Sameness:
     def is_copy(self) -> bool:
         """Whether one image is a copy of the other: nearly everything is the same."""
         return min(self.area, self.reduced_area, self.coarse_area) >= _COPY_SHARE
-
-    @property
-    def is_same_view(self) -> bool:
-        """Whether nearly everything is the same, and edges no sharper than in a camera's views."""
-        return self.is_copy and self.sharpness < VIEW_SHARPNESS
 
     @property
     def has_one_ground(self) -> bool:
