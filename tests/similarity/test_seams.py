@@ -7,7 +7,7 @@ import pytest
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
-from groundtie.similarity.seams import DRAWN_WIDTH, step_products, step_width
+from groundtie.similarity.seams import DRAWN_WIDTH, seams, step_products, step_width
 
 SIDE = 240
 COLUMNS, ROWS = (31, 61, 104, 140, 190, 215), (50, 97, 171, 220)
@@ -59,3 +59,14 @@ def test_edges_of_the_ground_along_columns_are_blurred() -> None:
 
 def test_where_nothing_varies_there_are_none() -> None:
     assert width(np.ones((SIDE, SIDE)), np.ones((SIDE, SIDE))) == np.inf
+
+
+def test_pixels_on_both_sides_of_seams_are_masked_and_few_others() -> None:
+    mask = seams(patch(tiled(view(1, 1))), patch(tiled(view(9, 2))))
+    beside = np.zeros_like(mask)
+    for at in COLUMNS:
+        beside[:, at - 1 : at + 1] = True
+    for at in ROWS:
+        beside[at - 1 : at + 1] = True
+    assert mask[beside].mean() > 0.8
+    assert mask[~beside].mean() < 0.02

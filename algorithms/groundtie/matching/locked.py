@@ -17,6 +17,7 @@ from ..context import Context
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
+from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
     LOOK_REACH_PX,
     Look,
@@ -25,7 +26,7 @@ from ..similarity.in_common import (
     sameness_of,
 )
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
-from ..similarity.seams import step_products
+from ..similarity.seams import seams, step_products
 from .chip_windows import ChipWindows, Resampled, singly
 from .matcher import Places
 
@@ -38,8 +39,9 @@ _NEAR_PX = 1.5
 # refused, but some beyond 0.09, and one of the suite series at 0.08.
 EXACT_PX = 0.0625
 
-# Around an edge, chips see it this far off.
+# Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
 _EDGE_SURROUNDINGS_PX = 9
+_SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
 
 
 class Sensors(Enum):
@@ -126,6 +128,8 @@ class LockedContent:
             same = covered(same, WINDOW_PX)
             if self.sameness.has_sharp_edges or self.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
+            if self.sameness.has_seams:
+                same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
         return same[reach:-reach, reach:-reach]
 
 

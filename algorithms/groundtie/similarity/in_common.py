@@ -60,12 +60,13 @@ _LEAST_AREA = 0.3
 # more; of different ground 0 to 21 %, of ground that was displaced up to 43 %, which is left to the
 # rules on a second place. Less than a tenth of the area shows nothing. As much may follow in other
 # colours: 24 % of a noisy negative (tests/test_steps.py), up to 1 % of what is drawn over two
-# radars' images of different ground.
+# radars' images of different ground. The further step is an octave: by it, 1.04 times as much and
+# more varies alike in right radar pairs, less in noise that is smooth along some pixels (suite
+# attacks).
 #
-# The further step is an octave: by it, patterns of noise that are smooth along up to 2 pixels are
-# alike by 0.78 times as much, or less (tests/matching/test_locked.py). Right radar pairs are by
-# 1.04 times as much and more (suite attacks), two dates of one camera, as light and seasons differ
-# over wide areas, by 0.96 times and more (suite sharpness).
+# Light and seasons differ over wide areas: two dates of one camera are alike in coarse pixels by
+# 0.96 times as much as in finer ones, or more (suite sharpness); patterns of noise that are smooth
+# along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py).
 _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
@@ -138,9 +139,9 @@ class Sameness:
     def is_finer_than_ground(self) -> bool:
         """Whether less is the same in coarser pixels.
 
-        Ground is hardly less alike there, where noise has averaged out; noise that both have is.
+        Ground is no less alike there, where noise has averaged out; noise that both have is.
         """
-        return self.coarse_area < _LEAST_COARSE_SHARE * self.reduced_area
+        return self.coarse_area < self.reduced_area
 
     @property
     def is_copy_in_other_colours(self) -> bool:
@@ -153,19 +154,23 @@ class Sameness:
         return min(self.area, self.reduced_area, self.coarse_area) >= _COPY_SHARE
 
     @property
-    def has_one_ground(self) -> bool:
-        """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
-        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
-
-    @property
     def is_view(self) -> bool:
-        """Whether both may be one camera's views of one ground, or one exposure's bands."""
-        return self.has_one_ground and self.sharpness < VIEW_SHARPNESS
+        """Whether both may be one camera's views of one ground.
+
+        Edges coincide no more sharply than those of its bands, and little less is alike in coarser
+        pixels, by light and season.
+        """
+        is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
+        return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def varies_as_ground(self) -> bool:
-        """Whether as much as of one ground varies alike, or follows in other colours."""
-        return self.has_one_ground or self.related >= _GROUND_SHARE
+        """Whether as much as of one ground varies alike, or follows in other colours.
+
+        What is not the same varies alike, too, as one sensor's views of one ground.
+        """
+        has_one_ground = self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
+        return has_one_ground or self.related >= _GROUND_SHARE
 
 
 _NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), len(_NEAR_PX)), int)

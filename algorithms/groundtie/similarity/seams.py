@@ -34,6 +34,9 @@ STANDARD_ERRORS = 1.645
 # from 0.51 on; of seams, stripes and lines of maps from 0.04 on, mostly below this.
 DRAWN_WIDTH = 0.3
 
+# Steps from so many standard deviations on, in both, are masked: one in 370 is as high by chance.
+_MASKED_DEVIATIONS = 3.0
+
 
 def step_products(reference: Patch, input: Patch) -> NDArray[np.float64]:
     """Return sums of products of steps of two patches, of columns and of rows, by lag, (2, k)."""
@@ -61,6 +64,21 @@ def step_width(products: NDArray[np.floating]) -> float:
     far = aligned[np.abs(_LAG) > _NEAR]
     here, *beside = (float(aligned[_LAGS + k] - far.mean()) for k in (0, -1, 1))
     return (max(*beside, 0.0) + STANDARD_ERRORS * float(far.std())) / here if here > 0 else np.inf
+
+
+def seams(reference: Patch, input: Patch) -> Mask:
+    """Return the pixels of rows and columns beside which both patches step, shape (h, w)."""
+    found = np.zeros(reference.values.shape, bool)
+    for mask, one, other in zip(
+        (found, found.T), _both_ways(reference), _both_ways(input), strict=True
+    ):
+        apart = np.pad(other, ((0, 0), (1, 1)))
+        near = [apart[:, k : k + one.shape[1]] for k in range(3)]
+        both = np.minimum(np.abs(one), np.abs(near).max(axis=0)) >= _MASKED_DEVIATIONS
+        for rows, steps in zip(_blocks(len(mask)), both, strict=True):
+            mask[rows, :-1] |= steps
+            mask[rows, 1:] |= steps
+    return found
 
 
 def _both_ways(patch: Patch) -> tuple[FloatImage, FloatImage]:
