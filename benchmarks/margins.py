@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundtie.errors import GroundTieError
+from groundtie.geometry.judging import RIVAL_HEIGHT
 from groundtie.kinds import plain
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.survey import Survey
@@ -25,7 +26,6 @@ from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
-    RIVAL_HEIGHT,
     WEAK_HEIGHT,
     deviations_beyond,
     deviations_elsewhere,

@@ -15,7 +15,7 @@ from ..geometry.rows import Rows
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..matching.check import CHECK_RADIUS_PX
-from ..rasters.grid import FloatArray, Grid, metres_per_unit_at
+from ..rasters.grid import FloatArray, Grid, finite, metres_per_unit_at
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
@@ -170,6 +170,6 @@ class PointErrors(Rows):
 
 def _metres_per_unit(transform: Transform, xy: FloatArray) -> FloatArray:
     """Return how long the reference map's units are at the middle of some positions, (2,)."""
-    finite = xy[np.isfinite(xy).all(axis=1)]
-    centre = finite.mean(axis=0) if len(finite) else np.zeros(2)
+    placed = finite(xy)
+    centre = placed.mean(axis=0) if len(placed) else np.zeros(2)
     return np.array(metres_per_unit_at(centre, transform.crs))

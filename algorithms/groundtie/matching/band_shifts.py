@@ -15,6 +15,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from ..geometry.judging import TOLERANCE_PX
 from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
 from ..rasters.windows import Window
@@ -22,7 +23,6 @@ from ..similarity.orientation import SCALES_PX, compress, edge_strength, squared
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface, normalise
 from .matcher import Places
-from .parts import SAME_PX
 
 # Windows all over the image: at most so large, and so many along a side.
 _WINDOW_PX, _MOST_ALONG = 192, 3
@@ -125,7 +125,7 @@ def _shift_px(
     surface = normalise(np.asarray(cv2.GaussianBlur(whole, (0, 0), _BLUR_PX), np.float32))
     peak = find_peak(surface)
     least = _LEAST_HEIGHT
-    if np.hypot(*peak.shift_px) > SAME_PX:
+    if np.hypot(*peak.shift_px) > TOLERANCE_PX:
         least = max(least, _CLEAR * _height_unmoved(surface))
     return np.array(peak.shift_px) if peak.height > least else None
 

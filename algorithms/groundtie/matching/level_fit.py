@@ -9,6 +9,7 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.chance import agreement_probability, log10_false_alarms
+from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import PARAMETERS, Model, fewest_points
 from ..geometry.robust import distances, find_consensus
 from ..rasters.grid import Grid
@@ -20,8 +21,7 @@ from .frames import compose
 from .matcher import Places
 from .pooled import PooledHistogramMatcher
 
-# Chips and agreement at every level of the pyramid, in pixels of the level.
-_TOLERANCE_PX = 2.0
+# Chips at every level of the pyramid, in pixels of the level.
 _CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
 
@@ -71,14 +71,14 @@ def fit_level(
     own = peak_shifts(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)
-    probability = agreement_probability(_TOLERANCE_PX, radius_px)
+    probability = agreement_probability(TOLERANCE_PX, radius_px)
     found = px + peak_shifts(supported)
     # Simple models are preferred unless the data favour others: each has its number of hypotheses
     # counted against it.
     for kind in LINEAR_CANDIDATES:
-        fitted = find_consensus(px, found, _TOLERANCE_PX, kind)
+        fitted = find_consensus(px, found, TOLERANCE_PX, kind)
         # Peaks after belief propagation are not independent; only the chips' own are counted.
-        agreeing = int((distances(fitted, px, px + own) < _TOLERANCE_PX).sum())
+        agreeing = int((distances(fitted, px, px + own) < TOLERANCE_PX).sum())
         alarms = log10_false_alarms(agreeing, len(px), probability, fewest_points(kind))
         if alarms < best.log10_false_alarms:
             best = CoarseModel(compose(model, fitted, level), alarms)

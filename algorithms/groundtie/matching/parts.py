@@ -15,18 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from ..geometry.judging import TOLERANCE_PX
 from ..rasters.grid import FloatArray, Grid, mesh
 from .belief_propagation import Surfaces
-
-# Chips agree with each other, or with the model, within this distance.
-SAME_PX = 2.0
 
 # Farther from where the model has them, they lie elsewhere. What is highest still farther off may
 # be canopies of 30 m, in pixels of 1 m, and is a part only where it is an eighth of the chips: of
 # 607 right transforms canopies were as many in one (suites calibration --seeds 440-499 and, large
 # rural scenes, 440-565; simulated --seeds 201-206; real; attacks: controls --seeds 33000-33039); a
 # fifth of an image holds 7 of 49.
-ELSEWHERE_PX, _CANOPIES_PX, _CANOPIES_SHARE = 2 * SAME_PX, 20.0, 1 / 8
+ELSEWHERE_PX, _CANOPIES_PX, _CANOPIES_SHARE = 2 * TOLERANCE_PX, 20.0, 1 / 8
 
 # Fewer chips are no part, and none counts for more than this.
 _FEWEST_CHIPS = 3
@@ -133,7 +131,7 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
     distance = np.hypot(*shifts.T)
     is_far = distance > ELSEWHERE_PX
     shown = _limited(surfaces).astype(float).reshape(len(surfaces), len(shifts))
-    own = shown[:, distance <= SAME_PX].max(axis=1, keepdims=True)
+    own = shown[:, distance <= TOLERANCE_PX].max(axis=1, keepdims=True)
     return shifts[is_far], shown[:, is_far] - own
 
 

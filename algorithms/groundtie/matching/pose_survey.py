@@ -16,7 +16,7 @@ from ..context import Context
 from ..geometry.estimation import Fitted
 from ..geometry.models import Model
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray, Grid, finite
 from ..rasters.pair import ImagePair
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import SimilaritySettings
@@ -130,8 +130,7 @@ def survey_pose(
 def _covered(grid: Grid, transform: Transform) -> Grid:
     """Return the part of a grid in which a transform has the input."""
     outline = transform.inverse(transform.input_grid.outline())
-    px = grid.map_to_pixel(outline)
-    px = px[np.isfinite(px).all(axis=1)]
+    px = finite(grid.map_to_pixel(outline))
     size = np.array(grid.size)
     if len(px) == 0:
         return grid

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import AmbiguousPlaceError, NothingFoundError
+from ..geometry.judging import RIVAL_HEIGHT
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..rasters.grid import Grid
@@ -24,7 +25,6 @@ _CERTAIN = -6.0
 
 # Repetitive places match more than once. A candidate nearly as high as the best is looked at, and
 # is a rival if chips support it with at least half the evidence (log10).
-_RIVAL_HEIGHT = 0.8
 _RIVAL_EVIDENCE = 0.5
 _SAME_PLACE_PX = 5.0
 
@@ -98,7 +98,7 @@ def _descend(
     tried: list[CoarseModel] = []
     for candidate in candidates:
         certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
-        if certain and candidate.height < _RIVAL_HEIGHT * candidates[0].height:
+        if certain and candidate.height < RIVAL_HEIGHT * candidates[0].height:
             break
         tried.append(fit_level(coarsest, level, candidate.model, _RADIUS_PX, quiet))
     if not tried or min(map(_alarms, tried)) > _HOPELESS:
@@ -122,7 +122,7 @@ def _descend_pooled(
     if not candidates:
         raise NothingFoundError("nothing in common was found")
     best, *others = candidates
-    if others and others[0].height > _RIVAL_HEIGHT * best.height:
+    if others and others[0].height > RIVAL_HEIGHT * best.height:
         raise AmbiguousPlaceError("two places match about as well")
     model = best.model
     while not _reaches_tie_points(factor):

@@ -11,6 +11,7 @@ import numpy as np
 from ..context import Context
 from ..errors import TooFewPointsError
 from ..geometry.estimation import Estimate, Fitted
+from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import DEGREE, PARAMETERS, TERRAIN, Model
 from ..geometry.robust import fit_mixture
 from ..geometry.terrain import Terrain
@@ -34,9 +35,6 @@ _NEAR_PX = 3
 
 # Largest shift of a chip of the fit from where a coarse model predicts it.
 FIT_RADIUS_PX = 8
-
-# Largest distance between a match and its match back for points of the fit.
-_FORWARD_BACKWARD_PX = 2.0
 
 # The matchers of chips with surfaces.
 SurfaceMatcher: TypeAlias = ChipMatcher | PooledHistogramMatcher
@@ -149,8 +147,8 @@ def fit_points(
         return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
 
     points = _tie_points(pair, surfaces, model, peaks, is_check=False)
-    limit = f"forward–backward error above {_FORWARD_BACKWARD_PX:g} px"
-    return points.reject(points.forward_backward_error_px > _FORWARD_BACKWARD_PX, limit)
+    limit = f"forward–backward error above {TOLERANCE_PX:g} px"
+    return points.reject(points.forward_backward_error_px > TOLERANCE_PX, limit)
 
 
 def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePoints:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
+from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import Model
 from ..rasters.grid import FloatArray, Grid
 from ..similarity.order_statistics import robust_deviation
@@ -22,7 +23,6 @@ from .matcher import MaskOf, Places
 from .parts import (
     ELSEWHERE_PX,
     MOST_OF_ONE,
-    SAME_PX,
     Part,
     find_parts,
 )
@@ -35,7 +35,7 @@ _CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 SURVEY_RADIUS_PX = 24
 
 # A peak is higher than all around it that counts as the same place.
-_NEIGHBOURS = np.ones((2 * int(SAME_PX) + 1,) * 2, np.uint8)
+_NEIGHBOURS = np.ones((2 * int(TOLERANCE_PX) + 1,) * 2, np.uint8)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Survey:
     @property
     def is_confirming_chip(self) -> NDArray[np.bool_]:
         """Which chips match where the model has them, shape (n,)."""
-        return np.asarray(np.hypot(*self.shifts_px.T) <= SAME_PX)
+        return np.asarray(np.hypot(*self.shifts_px.T) <= TOLERANCE_PX)
 
     @property
     def confirming(self) -> int:
@@ -81,13 +81,13 @@ class Survey:
     @property
     def comparable(self) -> int:
         """How many chips overlap with the input where the model has them: surfaces are 0 else."""
-        near = self.surfaces[:, self._distance_px <= SAME_PX]
+        near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
         return int((near != 0).any(axis=1).sum())
 
     @property
     def height(self) -> float:
         """How high the chips' similarity is on average where the model has them."""
-        return float(self.mean[self._distance_px <= SAME_PX].max())
+        return float(self.mean[self._distance_px <= TOLERANCE_PX].max())
 
     @property
     def rival_height(self) -> float:

@@ -19,6 +19,7 @@ from ..errors import (
     TooFewPointsError,
 )
 from ..geometry.accuracy import NOTHING_COMMON, Common
+from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import Model
 from ..masks.used import INPUT
 from ..rasters.grid import FloatArray, Grid
@@ -34,11 +35,9 @@ from .specification import Specification
 from .stages import Stages
 from .verdict import judge_search
 
-# A coarse shift beyond this, in matching pixels, is put into the RPCs before points are matched: by
-# wrong RPCs the image is projected with the heights of other places.
-_COARSE_PX = 2.0
-
-# After that so much is left to search for, in matching pixels.
+# A coarse shift that points would not agree with is put into the RPCs before they are matched: by
+# wrong RPCs the image is projected with the heights of other places. After that so much is left to
+# search for, in matching pixels.
 _LEFT_PX = 20.0
 
 
@@ -119,7 +118,7 @@ def match_ground_control(
         refused = replace(begun, verdict=judge_search(error))
         return GroundControl(refused, None)
     shift_px = _shift_in_image(pair.pair, by, coarse)
-    if np.hypot(*shift_px) > _COARSE_PX:
+    if np.hypot(*shift_px) > TOLERANCE_PX:
         by = replace(by, rpc=by.rpc.shifted(shift_px))
         spec = replace(spec, search_radius_m=_LEFT_PX * pair.pair.grid.pixel_size_m)
         pair = opened(by, spec)

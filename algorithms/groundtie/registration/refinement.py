@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +16,7 @@ from ..errors import NotRegisteredError, TooFewPointsError
 from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
+from ..kinds import plain
 from ..masks.used import MaskUsed
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
 from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control, adjust
@@ -122,14 +122,9 @@ class RefinementEvidence:
 
     def summary(self) -> dict[str, Any]:
         """Return which points were held out, and their errors, as values that JSON can carry."""
-        errors = {
-            name: {
-                key: value if math.isfinite(value) else None
-                for key, value in statistics.summary("px", ("col", "row")).items()
-            }
-            for name, statistics in (("before", self.before), ("after", self.after))
-        }
-        return {"held_out": self.held_out.name, **errors}
+        found = {"before": self.before, "after": self.after}
+        errors = {name: each.summary("px", ("col", "row")) for name, each in found.items()}
+        return {"held_out": self.held_out.name, **plain(errors)}
 
     @property
     def _used_px(self) -> FloatArray:

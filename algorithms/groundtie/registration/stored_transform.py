@@ -14,7 +14,7 @@ from ..errors import (
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
-from ..rasters.grid import FloatArray, Grid, require_both_or_none
+from ..rasters.grid import FloatArray, Grid, finite, require_both_or_none
 from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
 from .verdict import decide
@@ -100,6 +100,6 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
 
 
 def _boxes_meet(px: FloatArray, grid: Grid) -> bool:
-    px = px[np.isfinite(px).all(axis=1)]
+    px = finite(px)
     size = np.array(grid.size) - 0.5
     return len(px) > 0 and bool(np.all((px.max(axis=0) > -0.5) & (px.min(axis=0) < size)))

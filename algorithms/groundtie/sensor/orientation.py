@@ -17,6 +17,7 @@ from ..rasters.grid import (
     Grid,
     PointFunction,
     crs_name,
+    finite,
     near_longitude,
     reproject,
 )
@@ -242,8 +243,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    lon_lat = rpc.localise(*image_lattice(size, [height_m], nodes))
-    seen = lon_lat[np.isfinite(lon_lat).all(axis=1)]
+    seen = finite(rpc.localise(*image_lattice(size, [height_m], nodes)))
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")
     return seen
