@@ -31,6 +31,10 @@ DATES_SHARE = 0.4
 # timed series of the suite series, of 560² pixels.
 DESCRIBED_SHARE = 0.15
 
+# So many distances, or values of kernels, of all rows of one table with all of another one are made
+# at a time.
+AT_ONCE = 4_000_000
+
 # What glibc's `mallopt` calls its options, and what they are set to. Threads share two heaps: there
 # are eight for each processor else, of which each keeps what its threads have given back, 110 MB
 # in the registration of 10 000² pixels by two threads, and no time is saved by it. Arrays come from

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ParameterError
+from ..memory import AT_ONCE
 from ..rasters.atomic import write_json
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
@@ -29,9 +30,6 @@ _FORMAT = "groundtie feature classifier"
 _VERSION = 1
 
 _SCALING = ("mean", "spread", "low", "high")
-
-# So many values of kernels are held in memory at a time.
-_BLOCK = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class FeatureClassifier:
         """Return for statistics, shape (m, k), values that are positive for what is kept, (m,)."""
         scaled = np.clip((statistics - self.mean) / self.spread, self.low, self.high)
         found = np.empty(len(scaled))
-        step = max(_BLOCK // len(self.vectors), 1)
+        step = max(AT_ONCE // len(self.vectors), 1)
         for start in range(0, len(scaled), step):
             block = slice(start, start + step)
             found[block] = self._kernel(scaled[block]) @ self.weights + self.intercept

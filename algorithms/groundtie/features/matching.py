@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.rows import Rows
+from ..memory import AT_ONCE
 from ..rasters.grid import FloatArray
 
 Descriptors = NDArray[np.float32]
@@ -15,9 +16,6 @@ Indices = NDArray[np.intp]
 
 # How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
 GATE_PX = 16
-
-# So many distances are held in memory at a time.
-_BLOCK = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ def _pairs_within(first: FloatArray, second: FloatArray, reach: float) -> Indice
 
 def _pair_distances(first: Descriptors, second: Descriptors, pairs: Indices) -> FloatArray:
     distances = np.zeros(len(pairs))
-    step = max(_BLOCK // max(first.shape[1], 1), 1)
+    step = max(AT_ONCE // max(first.shape[1], 1), 1)
     for start in range(0, len(pairs), step):
         one, other = pairs[start : start + step].T
         difference = first[one] - second[other]

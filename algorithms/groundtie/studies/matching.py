@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..features.matching import Descriptors, FloatArray, Indices, Matches, Nearest
 from ..geometry.fitting import fit_model
 from ..geometry.models import PARAMETERS
+from ..memory import AT_ONCE
 
 METHODS = ("exact", "kd-tree")
 
@@ -20,9 +21,6 @@ _CHECKS = 64
 # the second are rounding.
 _SIGMAS = 2.0
 _ROUNDING_PX = 1e-6
-
-# So many distances are held in memory at a time.
-_BLOCK = 4_000_000
 
 
 def match(
@@ -105,7 +103,7 @@ def _two_nearest(first: Descriptors, second: Descriptors) -> tuple[Indices, Floa
     own, other = (first**2).sum(axis=1), (second**2).sum(axis=1)
     index = np.zeros((len(first), 2), np.intp)
     squared = np.zeros((len(first), 2))
-    step = max(_BLOCK // len(second), 1)
+    step = max(AT_ONCE // len(second), 1)
     for start in range(0, len(first), step):
         block = slice(start, start + step)
         distances = own[block, None] + other - 2 * (first[block] @ second.T)
