@@ -151,8 +151,12 @@ class RefinedRpc:
 
     Parameters
     ----------
-    image
-        The image, with the RPCs as delivered.
+    path
+        The image.
+    grid
+        Its pixels.
+    ground
+        Which heights are used, in words.
     points
         The ground control; blunders are rejected.
     fit
@@ -169,7 +173,9 @@ class RefinedRpc:
         What was written, by name.
     """
 
-    image: OrientedImage
+    path: str
+    grid: Grid
+    ground: str
     points: ControlPoints
     fit: RPCFit
     evidence: RefinementEvidence
@@ -215,7 +221,7 @@ class RefinedRpc:
             adjustment = adjust(control, model)
         except TooFewPointsError as error:
             verdict = judge_search(error)
-            raise _refused(image, verdict) from error
+            raise _refused(image.source.path, verdict) from error
         blunders = np.zeros(len(points), bool)
         blunders[np.flatnonzero(fitted)[~adjustment.used]] = True
         needs_spread = found is not None or model != SHIFT
@@ -234,17 +240,14 @@ class RefinedRpc:
         above = _median_above(kept, image.orientation.heights) if found is None else None
         heights = check_heights(image.orientation, control, adjustment, above)
         mask = None if found is None else found.registration.mask
-        return cls(image, kept, fit, evidence, judge(evidence), heights, mask)
+        own, ground = image.source.grid.on_own_pixels(), image.heights
+        verdict = judge(evidence)
+        return cls(image.source.path, own, ground, kept, fit, evidence, verdict, heights, mask)
 
     @property
     def adjustment(self) -> Adjustment:
         """The bias, as it was estimated."""
         return self.evidence.adjustment
-
-    @property
-    def grid(self) -> Grid:
-        """The image's pixels."""
-        return self.image.source.grid.on_own_pixels()
 
     def residuals(self) -> PointErrors:
         """Return by how much the refined RPCs miss the points, in the image.
@@ -267,7 +270,7 @@ class RefinedRpc:
     def require_accepted(self) -> None:
         """Raise `NotRegisteredError` if it was refused."""
         if not self.verdict.accepted:
-            raise _refused(self.image, self.verdict)
+            raise _refused(self.path, self.verdict)
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
@@ -277,7 +280,7 @@ class RefinedRpc:
             "bias": self.adjustment.bias.to_json(),
             "left_out_rmse_px": self.adjustment.left_out_rmse_px,
             "folding_residual_px": self.fit.largest_residual_px,
-            "heights": {"used": self.image.heights, **self.heights.summary()},
+            "heights": {"used": self.ground, **self.heights.summary()},
             "mask": None if self.mask is None else self.mask.summary(),
             "files": self.files,
         }
@@ -297,7 +300,7 @@ class RefinedRpc:
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             *([f"set by hand: {by_hand} points"] if by_hand else []),
-            self.image.heights,
+            self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
             *(f"warning: {line}" for line in self.heights.warnings()),
             *file_lines(self.files),
@@ -316,6 +319,5 @@ def _median_above(points: ControlPoints, heights: Heights) -> float | None:
     return float(np.median(above)) if len(above) else None
 
 
-def _refused(image: OrientedImage, verdict: Verdict) -> NotRegisteredError:
-    name = image.source.path
-    return NotRegisteredError(f"the RPCs of {name} were not refined: {verdict.sentence()}", verdict)
+def _refused(path: str, verdict: Verdict) -> NotRegisteredError:
+    return NotRegisteredError(f"the RPCs of {path} were not refined: {verdict.sentence()}", verdict)

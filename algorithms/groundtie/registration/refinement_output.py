@@ -19,6 +19,7 @@ from ..rasters.delivery import write_with_geotransform
 from ..rasters.grid import FloatArray
 from ..rasters.reading import RasterSource
 from ..report.refinement_report import RefinementReport
+from ..sensor.bias import Bias
 from ..sensor.control_points import ControlPoints
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_files import write_rpc
@@ -87,13 +88,21 @@ class RefinementFiles:
             replace(found.registration, parameters=self.parameters).report(self.report)
         return found.accepted()
 
-    def write(self, refined: RefinedRpc, found: GroundControl | None, progress: Progress) -> None:
+    def write(
+        self,
+        refined: RefinedRpc,
+        image: OrientedImage,
+        found: GroundControl | None,
+        progress: Progress,
+    ) -> None:
         """Write all files; of a refused refinement the report alone.
 
         Parameters
         ----------
         refined
             What was estimated.
+        image
+            The image, with the RPCs as delivered.
         found
             The matching that the points come from; None: they were given.
         progress
@@ -104,7 +113,6 @@ class RefinementFiles:
         NotRegisteredError
             The refinement is refused.
         """
-        image = refined.image
         with Outputs() as outputs:
             if refined.verdict.accepted:
                 self.write_output(image, refined.fit, outputs.stage(self.output), progress)
@@ -114,14 +122,16 @@ class RefinementFiles:
                     refined.points.write(staged, by_refined, image.source.grid)
             # Last: who finds it finds all that it is about.
             if self.report is not None:
-                self._page(refined, found).write(outputs, self.report)
+                self._page(refined, image, found).write(outputs, self.report)
         refined.require_accepted()
 
-    def _page(self, refined: RefinedRpc, found: GroundControl | None) -> RefinementReport:
+    def _page(
+        self, refined: RefinedRpc, image: OrientedImage, found: GroundControl | None
+    ) -> RefinementReport:
         return RefinementReport(
             refined,
-            None if found is None else _compared(refined, found),
-            title=f"RPCs of {Path(refined.image.source.path).name}, refined",
+            None if found is None else _compared(refined.adjustment.bias, image, found),
+            title=f"RPCs of {Path(refined.path).name}, refined",
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )
@@ -171,11 +181,10 @@ def require_place(source: RasterSource, output: Path | None, *more: Path | None)
         )
 
 
-def _compared(refined_rpc: RefinedRpc, found: GroundControl) -> Comparison:
+def _compared(bias: Bias, image: OrientedImage, found: GroundControl) -> Comparison:
     """Draw the reference and the image on the map, as delivered and as refined."""
-    pair, image = found.registration.pair, refined_rpc.image
-    bias = refined_rpc.adjustment.bias
     delivered = replace(image.source, grid=sensor_grid(image.source, image.orientation))
+    pair = found.registration.pair
     pair = replace(pair, input=replace(pair.input, source=delivered))
 
     def refined(xy: FloatArray) -> FloatArray:

@@ -130,7 +130,7 @@ def refine_into(
         refined = RefinedRpc.of(points, sensor, model, max_error_px, found)
         for warning in refined.heights.warnings():
             context.update(0.9, warning)
-        files.write(refined, found, context.part(0.9, 1.0).progress)
+        files.write(refined, sensor, found, context.part(0.9, 1.0).progress)
     return replace(refined, files=files.written())
 
 

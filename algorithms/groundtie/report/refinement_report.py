@@ -34,7 +34,7 @@ class RefinementReport(Page):
             "verdict": found.verdict.summary() | found.evidence.summary(),
             "bias": found.adjustment.bias.to_json(),
             "points_by_hand": found.points.by_hand,
-            "heights": {"used": found.image.heights, "warnings": found.heights.warnings()},
+            "heights": {"used": found.ground, "warnings": found.heights.warnings()},
             "mask": None if found.mask is None else found.mask.summary(),
         }
 
@@ -64,4 +64,4 @@ class RefinementReport(Page):
         found, count = self.refined, self.refined.points.by_hand
         by_hand = [f"points set by hand: {count}"] if count else []
         mask = [] if found.mask is None else [found.mask.line()]
-        return [found.image.heights, *by_hand, *mask]
+        return [found.ground, *by_hand, *mask]
