@@ -27,7 +27,7 @@ def test_a_displacement_survives_all_its_forms() -> None:
 def test_its_numbers_are_pixels_at_the_centre_and_at_the_border() -> None:
     model = FRAME.model(DISPLACEMENT)
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    moved = (FRAME.enter(model(FRAME.leave(uv))) - uv) * FRAME.half_px
+    moved = (FRAME.square.enter(model(FRAME.square.leave(uv))) - uv) * FRAME.half_px
     expected = [[3.0, -2.0], [3.4, -1.9], [2.8, -1.4]]
     np.testing.assert_allclose(moved, expected, atol=1e-9)
 

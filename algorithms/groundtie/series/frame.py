@@ -86,19 +86,18 @@ class SeriesFrame:
         is_there = np.allclose(corners, self.grid.outline(1), rtol=0, atol=ROUNDING_PX)
         return is_there and (made.crs, made.width) == (self.grid.crs, self.grid.width)
 
-    def enter(self, xy: FloatArray) -> FloatArray:
-        """Return map positions, shape (n, 2), in units of the square."""
-        return np.asarray((self.grid.map_to_pixel(xy) - self.centre_px) / self.half_px)
-
-    def leave(self, uv: FloatArray) -> FloatArray:
-        """Return positions in units of the square, shape (n, 2), on the map."""
-        return self.grid.pixel_to_map(uv * self.half_px + self.centre_px)
+    @property
+    def square(self) -> Frame:
+        """The coordinates of the square on the map."""
+        scale = Affine.scale(self.half_px)
+        moved = Affine.translation(*self.centre_px)
+        return Frame(compose(self.grid.centre_transform, moved, scale))
 
     def displacement_of(self, move: Move) -> FloatArray:
         """Return the displacement, (6,), that is nearest to a move of map positions."""
         side = np.linspace(-1, 1, _LATTICE)
-        uv = mesh(side, side)
-        moved = (self.enter(move(self.leave(uv))) - uv) * self.half_px
+        uv, square = mesh(side, side), self.square
+        moved = (square.enter(move(square.leave(uv))) - uv) * self.half_px
         return np.asarray(np.linalg.lstsq(monomials(uv, 1), moved, rcond=None)[0]).ravel()
 
     def matrix(self, displacement: FloatArray) -> FloatArray:
@@ -115,20 +114,15 @@ class SeriesFrame:
 
     def model(self, displacement: FloatArray) -> PolynomialModel:
         """Return a displacement as a model of map positions."""
-        square = compose(
-            self.grid.centre_transform,
-            Affine.translation(*self.centre_px),
-            Affine.scale(self.half_px),
-        )
         coefficients = displacement.reshape(3, 2) / self.half_px
         if np.abs(displacement[2:]).max() < ROUNDING_PX:
-            return PolynomialModel("translation", Frame(square), coefficients[:1])
-        return PolynomialModel("affine", Frame(square), coefficients)
+            return PolynomialModel("translation", self.square, coefficients[:1])
+        return PolynomialModel("affine", self.square, coefficients)
 
     def moved_grid(self, grid: Grid, displacement: FloatArray) -> Grid:
         """Return a date's grid as moved, at the centre, to where a displacement has its ground."""
-        ground = self.leave(np.zeros((1, 2)))
-        nominal = self.leave(displacement[None, :2] / self.half_px)
+        ground = self.square.leave(np.zeros((1, 2)))
+        nominal = self.square.leave(displacement[None, :2] / self.half_px)
         there, here = (reproject(xy, self.grid.crs, grid.crs) for xy in (ground, nominal))
         return grid.shifted(*map(float, (there - here)[0]))
 

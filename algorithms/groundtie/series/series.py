@@ -109,7 +109,7 @@ class SeriesDate:
         displacement, covariance = verdict.displacement, verdict.covariance
         if displacement is None or covariance is None:
             return values
-        centre = frame.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
+        centre = frame.square.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
         shift_m = (centre[1] - centre[0]) * frame.grid.metres_per_unit
         return values | {
             "shift_x_px": float(displacement[0]),
