@@ -12,7 +12,7 @@ from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, kron
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
@@ -220,20 +220,13 @@ class _Network:
         if not free:
             return _Solution(displacements, covariance, scatter_px)
         displacements[free] = 0.0
-        weights: list[FloatArray] = [
-            np.asarray(np.linalg.inv(self._covariance(link, scatter_px)), float)
-            for link in self.links
-        ]
-        column = {date: k for k, date in enumerate(free)}
-        factors = splu(self._normal_matrix(weights, column))
+        weights = np.linalg.inv([self._covariance(link, scatter_px) for link in self.links])
+        design, count = self._design(free), len(weights)
+        pull = design.T @ bsr_matrix((weights, np.arange(count), np.arange(count + 1)))
+        factors = splu((pull @ design).tocsc())
         for _ in range(_STEPS):
-            right = np.zeros((len(free), PARAMETERS))
-            for link, weight in zip(self.links, weights, strict=True):
-                pull = weight @ self._residual(link, displacements)
-                for end, sign in ((link.second, 1), (link.first, -1)):
-                    if end != self.hub:
-                        right[column[end]] += sign * pull
-            step = factors.solve(right.ravel()).reshape(-1, PARAMETERS)
+            residuals = [self._residual(link, displacements) for link in self.links]
+            step = factors.solve(pull @ np.concatenate(residuals)).reshape(-1, PARAMETERS)
             displacements[free] += step
             if np.abs(step).max() < _PRECISION_PX:
                 break
@@ -282,19 +275,13 @@ class _Network:
         )
         return self.frame.of_matrix(between) - self.frame.of_matrix(second @ np.linalg.inv(first))
 
-    def _normal_matrix(self, weights: Sequence[FloatArray], column: dict[int, int]) -> object:
-        rows, cols, values = [], [], []
-        inside = np.indices((PARAMETERS, PARAMETERS)).reshape(2, -1)
-        for link, weight in zip(self.links, weights, strict=True):
-            for one, sign in ((link.first, 1), (link.second, -1)):
-                for other, other_sign in ((link.first, 1), (link.second, -1)):
-                    if self.hub not in (one, other):
-                        rows.append(inside[0] + PARAMETERS * column[one])
-                        cols.append(inside[1] + PARAMETERS * column[other])
-                        values.append(sign * other_sign * weight.ravel())
-        size = (len(column) * PARAMETERS,) * 2
-        where = np.concatenate(rows), np.concatenate(cols)
-        return coo_matrix((np.concatenate(values), where), shape=size).tocsc()
+    def _design(self, free: list[int]) -> csr_matrix:
+        """Return how links depend on the dates that are free, shape (6 links, 6 dates)."""
+        count = len(self.links)
+        ends = [end for link in self.links for end in (link.second, link.first)]
+        where, signs = (np.repeat(np.arange(count), 2), ends), np.tile([1.0, -1.0], count)
+        differences = csr_matrix((signs, where), shape=(count, self.count))[:, free]
+        return kron(differences, np.eye(PARAMETERS), "csr")
 
 
 def _reached(links: Sequence[Link], kept: Mask, count: int, hub: int) -> Mask:
