@@ -324,22 +324,25 @@ class ToolCommand(click.Command):
                     formatter.write_dl(rows)
 
 
-class KindType(click.ParamType):
-    """Lets a parameter's kind check the words of the command line."""
+def _click_parameter(parameter: Parameter) -> click.Parameter:
+    """Return a parameter as click reads it: as words, which the tool checks."""
+    name, flag, kind = parameter.name, spelled(parameter), parameter.kind
+    if isinstance(kind, Flag):
+        return click.Option([f"{flag}/--no-{flag[2:]}", name], default=parameter.default)
+    asked: dict[str, Any] = {"required": parameter.required, "shell_complete": _completions(kind)}
+    if not parameter.positional:
+        return click.Option([flag, name], **asked)
+    if isinstance(kind, RastersIn):
+        return click.Argument([name], nargs=-1, metavar=f"{flag}…", **asked)
+    return click.Argument([name], metavar=flag, **asked)
 
-    def __init__(self, parameter: Parameter) -> None:
-        self.parameter = parameter
-        self.name = type(parameter.kind).__name__
 
-    def convert(self, value: Any, param: object, ctx: object) -> Any:
-        """Return `value` as the tools take it."""
-        return self.parameter.kind.check(spelled(self.parameter), value)
+def _completions(kind: Kind) -> Callable[..., list[CompletionItem]]:
+    """Return what offers the words that a value may be, or has the shell offer files or folders."""
 
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    def offered(
+        ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Return the words that a value may be, or have the shell offer files or folders."""
-        kind = self.parameter.kind
         if isinstance(kind, Choice):
             return [CompletionItem(word) for word in kind.choices if word.startswith(incomplete)]
         if isinstance(kind, (PathKind, RastersIn)):
@@ -347,20 +350,7 @@ class KindType(click.ParamType):
             return [CompletionItem(incomplete, type=shown)]
         return []
 
-
-def _click_parameter(parameter: Parameter) -> click.Parameter:
-    name, flag = parameter.name, spelled(parameter)
-    if parameter.positional and isinstance(parameter.kind, RastersIn):
-        files = KindType(parameter).shell_complete
-        return click.Argument(
-            [name], required=True, nargs=-1, type=str, metavar=f"{flag}…", shell_complete=files
-        )
-    if parameter.positional:
-        return click.Argument([name], type=KindType(parameter), metavar=flag)
-    need = {"required": True} if parameter.required else {"default": parameter.default}
-    if isinstance(parameter.kind, Flag):
-        return click.Option([f"{flag}/--no-{flag[2:]}", name], **need)
-    return click.Option([flag, name], type=KindType(parameter), **need)
+    return offered
 
 
 def spelled(parameter: Parameter) -> str:
