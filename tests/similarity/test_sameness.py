@@ -10,7 +10,6 @@ from groundtie.similarity.sameness import (
     Edges,
     Windows,
     edges_apart_px,
-    reduced,
 )
 
 
@@ -133,14 +132,3 @@ def test_invalid_pixels_are_no_part_of_windows() -> None:
     same = Windows.of(patch(one), patch(spoilt, hidden)).same
     assert not same[hidden].any()
     assert same[:20].all()
-
-
-def test_reduced_pixels_are_means_of_valid_ones() -> None:
-    values = np.arange(80.0).reshape(8, 10)
-    smaller = reduced(patch(values, np.s_[:4, :3]), 4)
-    assert smaller.values.shape == (2, 2)
-    # A quarter of the first square is left: the column 3 of the rows 0 to 3.
-    np.testing.assert_allclose(smaller.values[0, 0], np.mean([3, 13, 23, 33]))
-    np.testing.assert_allclose(smaller.values[1, 1], values[4:8, 4:8].mean())
-    assert smaller.valid.all()
-    assert not reduced(patch(values, np.s_[:4, :4]), 4).valid[0, 0]

@@ -69,12 +69,17 @@ def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:
     return np.asarray(cv2.resize(image[:height, :width], size, interpolation=cv2.INTER_AREA))
 
 
-def reduced_patch(window: Patch, factor: int) -> Patch:
-    """Return a window's means over blocks; blocks with any masked pixel are masked."""
+def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch:
+    """Return the means of a window's valid pixels over blocks, as `reduced`.
+
+    Blocks of which a smaller share than `least_valid` is valid are masked.
+    """
     if factor == 1:
         return window
-    masked = reduced((~window.valid).astype(np.float32), factor) > 0
-    return Patch(reduced(np.where(window.valid, window.values, 0), factor), ~masked)
+    share = reduced(window.valid.astype(np.float32), factor)
+    rounding = np.finfo(np.float32).eps
+    means = reduced(np.where(window.valid, window.values, 0), factor) / np.maximum(share, rounding)
+    return Patch(means, share >= least_valid - rounding)
 
 
 def empty_areas(values: FloatImage, valid: Mask) -> Mask:

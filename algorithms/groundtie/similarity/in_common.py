@@ -11,15 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.patch import Patch
+from ..rasters.patch import Patch, reduced_patch
 from ..rasters.reading import Mask
-from .sameness import (
-    FARTHEST_PX,
-    Edges,
-    Windows,
-    edges_apart_px,
-    reduced,
-)
+from .sameness import FARTHEST_PX, Edges, Windows, edges_apart_px
 from .seams import DRAWN_WIDTH, STANDARD_ERRORS, step_width
 
 # None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
@@ -70,6 +64,9 @@ _LEAST_AREA = 0.3
 _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
+
+# Pixels of reduced images are means of at least this share of theirs.
+_LEAST_VALID = 0.25
 
 # Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
 _COPY_SHARE = 0.75
@@ -200,9 +197,11 @@ class Look:
         both = reference, input
         without_same = [replace(patch, valid=patch.valid & ~whole.same) for patch in both]
         smaller, left = (
-            [reduced(patch, _REDUCTION) for patch in pair] for pair in (both, without_same)
+            [reduced_patch(patch, _REDUCTION, _LEAST_VALID) for patch in pair]
+            for pair in (both, without_same)
         )
-        pairs = smaller, [reduced(patch, _FURTHER) for patch in smaller], left
+        coarse = [reduced_patch(patch, _FURTHER, _LEAST_VALID) for patch in smaller]
+        pairs = smaller, coarse, left
         counts = np.array([whole.counts, *(Windows.of(*pair).counts for pair in pairs)])
         return cls(_count_edges(reference, input), counts)
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
-from ..rasters.patch import reduced as means
 from ..rasters.reading import FloatImage, Mask
 from .order_statistics import quantiles
 
@@ -39,9 +38,6 @@ FARTHEST_PX = 2
 _EITHER_WAY = range(-FARTHEST_PX, FARTHEST_PX + 1)
 _NEIGHBOURS = np.array([(x, y) for y in _EITHER_WAY for x in _EITHER_WAY])
 _NONE = np.zeros((1, 2), int)
-
-# Means of a reduced image need this share of their pixels.
-_LEAST_VALID = 0.25
 
 
 @dataclass(frozen=True)
@@ -191,14 +187,6 @@ def covered(middles: Mask, side_px: int) -> Mask:
     """Return all pixels of windows of a side around some."""
     window = np.ones((side_px, side_px), np.uint8)
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
-
-
-def reduced(patch: Patch, factor: int) -> Patch:
-    """Return the means of squares of valid pixels; what remains at the right and below is cut."""
-    share = means(patch.valid.astype(np.float32), factor)
-    sums = means(np.where(patch.valid, patch.values, 0).astype(np.float32), factor)
-    values = np.asarray(sums / np.maximum(share, np.finfo(np.float32).eps), np.float32)
-    return Patch(values, share >= _LEAST_VALID)
 
 
 def _variance(values: FloatImage, valid: Mask, share: FloatArray) -> FloatImage:
