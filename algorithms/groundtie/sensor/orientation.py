@@ -38,11 +38,8 @@ _TOLERANCE_DEG = 1e-9
 # The map around the image that can be projected into it, as a share of the image's side.
 _AROUND = 0.5
 
-# Places a side of an image whose ground gives the extent of the map.
-_NODES = 9
-
-# The share of an image whose heights are known is counted at so many places a side: to 1 %.
-_SHARE_NODES = 64
+# Places a side of an image at which its ground is looked at: shares of it are right to 1 %.
+_NODES = 64
 
 
 @dataclass(frozen=True)
@@ -201,9 +198,8 @@ def orient(
     else:
         heights = terrain_heights(dem, geoid, extremes)
     seen = seen_at(rpc, size, heights.typical_m)
-    places = seen_at(rpc, size, heights.typical_m, _SHARE_NODES)
-    known = float(np.isfinite(heights.at(places)).mean())
-    measured = float(heights.is_measured(places).mean())
+    known = float(np.isfinite(heights.at(seen)).mean())
+    measured = float(heights.is_measured(seen).mean())
     if dem is not None and known == 0:
         raise NoOverlapError(f"{dem.path} covers nothing of the area of {source.path}")
     xy = _on_map(np.vstack([extremes, seen]), rpc, crs)
