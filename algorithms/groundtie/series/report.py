@@ -73,10 +73,7 @@ class SeriesReport(Page):
             assert one.date is not None and one.transform is not None
             image = one.date.matched
             nominal = Transform.nominal(one.transform.crs, one.transform.input_grid)
-            to_px = [
-                pictures.overview_positions(transform.of_map(grid.crs), grid)
-                for transform in (nominal, one.transform)
-            ]
+            to_px = [transform.of_map(grid.crs) for transform in (nominal, one.transform)]
             uris = [
                 pictures.jpeg_uri(pictures.grey_picture(image.read_onto(grid, positions)))
                 for positions in to_px
