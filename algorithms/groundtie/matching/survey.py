@@ -20,12 +20,7 @@ from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .matcher import MaskOf, Places
-from .parts import (
-    ELSEWHERE_PX,
-    MOST_OF_ONE,
-    Part,
-    find_parts,
-)
+from .parts import ELSEWHERE_PX, MOST_OF_ONE, Part, find_parts
 
 # Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
 # more than so many along any.
