@@ -228,6 +228,13 @@ def cloud_deck(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
     return Overlay(215 + 25 * smooth_noise(shape, 4, rng), alpha, dark)
 
 
+@overlay("soft pattern noise")
+def soft_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
+    """Add the same noise, smooth along some pixels, as that of an interpolated sensor is."""
+    noise = smooth_noise(shape, float(rng.uniform(1.5, 4.0)), rng)
+    return Overlay(np.zeros(shape), np.zeros(shape), 1.0, float(rng.uniform(20, 60)) * noise)
+
+
 @overlay("fixed pattern noise")
 def fixed_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
     """Add the same noise, of pixels, rows or columns, as an uncalibrated sensor does."""

@@ -78,7 +78,7 @@ def test_tie_points_are_places_in_both_images(
 def test_a_strict_forward_backward_limit_rejects_points(
     monkeypatch: pytest.MonkeyPatch, pair: ImagePair, context: Context
 ) -> None:
-    monkeypatch.setattr(surface_fit, "_FORWARD_BACKWARD_PX", 0.05)
+    monkeypatch.setattr(surface_fit, "TOLERANCE_PX", 0.05)
     strict = fit_of(pair).estimate(COARSE, "translation", context)
     rejected = strict.points.take(~strict.points.used)
     assert 0 < strict.points.used.sum() < len(strict.points)
@@ -91,7 +91,7 @@ def test_a_model_that_no_point_agrees_with_is_none(
     monkeypatch: pytest.MonkeyPatch, pair: ImagePair, context: Context
 ) -> None:
     """No match back meets its start to the last digit."""
-    monkeypatch.setattr(surface_fit, "_FORWARD_BACKWARD_PX", 0.0)
+    monkeypatch.setattr(surface_fit, "TOLERANCE_PX", 0.0)
     with pytest.raises(TooFewPointsError, match="points agree"):
         fit_of(pair).estimate(COARSE, "affine", context)
 

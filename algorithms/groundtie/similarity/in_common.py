@@ -60,7 +60,8 @@ _LEAST_AREA = 0.3
 #
 # Light and seasons differ over wide areas: two dates of one camera are alike in coarse pixels by
 # 0.96 times as much as in finer ones, or more (suite sharpness); patterns of noise that are smooth
-# along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py).
+# along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py). Smoother ones
+# are as ground is, and pass (suite attacks, soft pattern noise).
 _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
