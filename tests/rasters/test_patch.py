@@ -57,7 +57,7 @@ def test_reduced_pixels_are_means_of_valid_ones() -> None:
     ]
 
 
-@pytest.mark.parametrize("factor", range(2, 12))
+@pytest.mark.parametrize("factor", [*range(2, 12), 49, 93])
 def test_blocks_that_are_whole_are_valid(factor: int) -> None:
     patch = Patch(np.ones((3 * factor,) * 2, np.float32), np.ones((3 * factor,) * 2, bool))
     assert reduced_patch(patch, factor).all_valid

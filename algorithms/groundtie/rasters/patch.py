@@ -76,10 +76,11 @@ def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch
     """
     if factor == 1:
         return window
-    share = reduced(window.valid.astype(np.float32), factor)
-    rounding = np.finfo(np.float32).eps
-    means = reduced(np.where(window.valid, window.values, 0), factor) / np.maximum(share, rounding)
-    return Patch(means, share >= least_valid - rounding)
+    # Means are rounded, counts are not: a block that is whole must be valid.
+    count = np.rint(reduced(window.valid.astype(np.float32), factor) * factor**2)
+    share = count / np.float32(factor**2)
+    sums = reduced(np.where(window.valid, window.values, 0), factor)
+    return Patch(sums / np.where(count > 0, share, 1), share >= least_valid)
 
 
 def empty_areas(values: FloatImage, valid: Mask) -> Mask:
