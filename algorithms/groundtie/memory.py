@@ -32,7 +32,7 @@ DATES_SHARE = 0.4
 DESCRIBED_SHARE = 0.15
 
 # So many distances, or values of kernels, of all rows of one table with all of another one are made
-# at a time.
+# at a time: 32 MB, which take part in no budget.
 AT_ONCE = 4_000_000
 
 # What glibc's `mallopt` calls its options, and what they are set to. Threads share two heaps: there

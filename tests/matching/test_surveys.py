@@ -60,7 +60,7 @@ def rest_of(
         transform = Transform(found, pair.grid.crs, other.grid)
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
-        return survey_rest(matcher, transform, places, ELSEWHERE_PX, sensors, EXACT_PX, context)
+        return survey_rest(matcher, transform, places, (ELSEWHERE_PX, EXACT_PX), sensors, context)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])

@@ -105,10 +105,10 @@ def survey_all(
     context
         Threads and progress.
     """
-    model, (elsewhere_px, exact_px) = transform.model, accuracy_px
+    model, elsewhere_px = transform.model, accuracy_px[0]
     whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
     part = context.part(0.4, 0.9)
-    rest = survey_rest(matcher, transform, places, elsewhere_px, sensors, exact_px, part)
+    rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
     ground = None
     if open_ground is not None:
         last = context.part(0.9, 1.0)
@@ -120,29 +120,13 @@ def survey_rest(
     matcher: ChipMatcher,
     transform: Transform,
     places: Places,
-    elsewhere_px: float,
+    accuracy_px: tuple[float, float],
     sensors: Sensors,
-    exact_px: float,
     context: Context,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays.
 
-    Parameters
-    ----------
-    matcher
-        What the chips are matched by.
-    transform
-        What was found.
-    places
-        The chips.
-    elsewhere_px
-        See `Survey`.
-    sensors
-        What the images may be.
-    exact_px
-        See `find_locked_content`.
-    context
-        Threads and progress.
+    Parameters as `survey_all`.
 
     Returns
     -------
@@ -150,6 +134,7 @@ def survey_rest(
     a radar's: speckle blurs it; and where none is looked for.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
+    elsewhere_px, exact_px = accuracy_px
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
     if locked is None or not (locked.is_evident or sensors is Sensors.RADARS):
         return None

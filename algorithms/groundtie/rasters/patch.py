@@ -78,9 +78,9 @@ def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch
         return window
     # Means are rounded, counts are not: a block that is whole must be valid.
     count = np.rint(reduced(window.valid.astype(np.float32), factor) * factor**2)
-    share = count / np.float32(factor**2)
+    share: FloatImage = count / np.float32(factor**2)
     sums = reduced(np.where(window.valid, window.values, 0), factor)
-    return Patch(sums / np.where(count > 0, share, 1), share >= least_valid)
+    return Patch(sums / np.maximum(share, np.finfo(np.float32).eps), share >= least_valid)
 
 
 def empty_areas(values: FloatImage, valid: Mask) -> Mask:
