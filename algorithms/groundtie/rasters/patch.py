@@ -78,7 +78,7 @@ def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch
         return window
     # Means are rounded, counts are not: a block that is whole must be valid.
     count = np.rint(reduced(window.valid.astype(np.float32), factor) * factor**2)
-    share: FloatImage = count / np.float32(factor**2)
+    share = count / np.float32(factor**2)
     sums = reduced(np.where(window.valid, window.values, 0), factor)
     return Patch(sums / np.maximum(share, np.finfo(np.float32).eps), share >= least_valid)
 
