@@ -177,7 +177,7 @@ def attempt(
         result.verdict.check_rmse_px,
         result.transform.model.kind,
         result.verdict.reason,
-        result.verdict.check_ce90_px,
+        result.verdict.accuracy.ce90_px,
     )
 
 

@@ -150,13 +150,13 @@ def compare(
     found = one.result
     assert pair.truth is not None
     errors = np.hypot(*pair.truth.off_px(on_pixels(found.transform, pair.reference)).T)
-    verdict = found.verdict
-    radii = verdict.accuracy.ce50_px, verdict.check_ce90_px, verdict.accuracy.ce95_px
+    accuracy = found.verdict.accuracy
+    radii = accuracy.ce50_px, accuracy.ce90_px, accuracy.ce95_px
     return CalibrationRun(
         name,
         group,
         ACCEPTED,
-        verdict.reason,
+        found.verdict.reason,
         float(np.sqrt(np.mean(errors**2))),
         pair.sigma_px,
         *radii,

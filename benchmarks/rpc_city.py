@@ -133,7 +133,7 @@ class CityCase:
             summary["verdict"]["check_rmse_px"],
             summary.get("bias", {}).get("model", "points"),
             summary["verdict"]["reason"],
-            summary["verdict"]["check_ce90_px"],
+            summary["verdict"]["ce90_px"],
         )
 
 

@@ -49,7 +49,7 @@ def describe_verdict(numbers: dict) -> str:
     verdict = numbers["verdict"]
     return (
         f"accepted: {verdict['points']} tie points, held-out RMSE "
-        f"{verdict['check_rmse_px']:.2f} px, CE90 {verdict['check_ce90_m']:.2f} m"
+        f"{verdict['check_rmse_px']:.2f} px, CE90 {verdict['ce90_m']:.2f} m"
     )
 
 

@@ -119,7 +119,7 @@ class AttackCase:
             verdict=judge(self.tool, pair, error_px),
             error_px=error_px,
             rmse_px=rmse_px,
-            claimed_ce90_px=getattr(result.verdict, "check_ce90_px", math.nan),
+            claimed_ce90_px=result.verdict.accuracy.ce90_px,
         )
 
     def save(self, folder: Path) -> None:

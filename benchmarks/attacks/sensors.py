@@ -159,7 +159,7 @@ class SensorCase:
             verdict=judge(error_px),
             error_px=error_px,
             rmse_px=float(np.sqrt(np.mean(off**2))),
-            claimed_ce90_px=result.summary()["verdict"].get("check_ce90_px") or math.nan,
+            claimed_ce90_px=result.summary()["verdict"].get("ce90_px") or math.nan,
         )
 
 

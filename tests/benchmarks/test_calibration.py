@@ -46,7 +46,6 @@ class Found:
         self.verdict = Verdict(
             True,
             "fine",
-            check_ce90_px=ce90_px,
             accuracy=Accuracy(ce90_px / 2, ce90_px, 1.2 * ce90_px, (ce90_px, ce90_px)),
         )
 

@@ -114,7 +114,7 @@ def test_limits(error_px: float, verdict: str) -> None:
 
 
 SUMMARY = {
-    "verdict": {"check_rmse_px": 0.5, "check_ce90_px": 2.6, "reason": "they agree"},
+    "verdict": {"check_rmse_px": 0.5, "ce90_px": 2.6, "reason": "they agree"},
     "bias": {"model": "shift"},
 }
 

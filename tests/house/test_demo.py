@@ -61,7 +61,7 @@ def fake_tools(
     return calls
 
 
-VERDICT = {"accepted": True, "points": 87, "check_rmse_px": 0.567, "check_ce90_m": 0.89}
+VERDICT = {"accepted": True, "points": 87, "check_rmse_px": 0.567, "ce90_m": 0.89}
 
 
 def test_says_verdict_error_and_places(

@@ -61,7 +61,7 @@ def test_what_displaces_all_control_alike_is_part_of_the_error(
     found = refinement(control((20, -9)), common=Common(np.zeros(2), sigma_px))
     verdict = judge(found)
     assert verdict.accepted == is_accepted
-    assert verdict.check_ce90_px == pytest.approx(2.15 * sigma_px, rel=0.05)
+    assert verdict.accuracy.ce90_px == pytest.approx(2.15 * sigma_px, rel=0.05)
 
 
 def test_a_model_that_points_do_not_hold_is_refused() -> None:

@@ -80,7 +80,7 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert f"{verdict.fit_points_used} of {verdict.fit_points} points" in lines[2]
     assert f"RMSE {verdict.check_rmse_px:.2f} px" in lines[3]
     low, high = verdict.accuracy.ce90_range_px
-    assert f"CE90 {verdict.check_ce90_px:.2f} px" in lines[4]
+    assert f"CE90 {verdict.accuracy.ce90_px:.2f} px" in lines[4]
     assert f"known to {low:.2f}–{high:.2f} px; 90 % in an ellipse of " in lines[4]
     assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[5]
     assert lines[-1] == "output: out.tif"

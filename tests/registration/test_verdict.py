@@ -56,7 +56,7 @@ def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong:
     assert verdict.reason == "check points confirm the registration"
     assert verdict.check_rmse_px == pytest.approx(math.sqrt(2) * sigma, rel=0.2)
     assert verdict.check_rmse_m == pytest.approx(10 * verdict.check_rmse_px)
-    assert verdict.check_ce90_m == pytest.approx(10 * verdict.check_ce90_px)
+    assert verdict.ce90_m == pytest.approx(10 * verdict.accuracy.ce90_px)
     assert (verdict.fit_points, verdict.check_points) == (72, count)
     assert verdict.points == verdict.fit_points_used + verdict.check_points_agreeing
     assert verdict.extrapolated_share < 0.2
@@ -65,19 +65,19 @@ def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong:
 def test_errors_of_single_check_points_are_none_of_the_transform() -> None:
     verdict = judged(check_points(scatter(72, 1.2)))
     # 72 points of 0.3 px hold an affine model to 0.3 · √(3 / 72) an axis, in the mean.
-    assert 0.5 * 2.146 * 0.3 * math.sqrt(3 / 72) < verdict.check_ce90_px < 0.5 * 2.146 * 1.2
+    assert 0.5 * 2.146 * 0.3 * math.sqrt(3 / 72) < verdict.accuracy.ce90_px < 0.5 * 2.146 * 1.2
 
 
 def test_what_all_check_points_share_is_an_error_of_the_transform() -> None:
     without, bias = (judged(check_points(scatter(72, 0.3) + [by, 0])) for by in (0.0, 1.2))
-    assert without.check_ce90_px < 0.4 < 1.2 < bias.check_ce90_px
+    assert without.accuracy.ce90_px < 0.4 < 1.2 < bias.accuracy.ce90_px
 
 
 def test_radii_of_higher_probability_are_larger_and_come_with_an_interval() -> None:
     verdict = judged(check_points(scatter(72, 0.3)))
     low, high = verdict.accuracy.ce90_range_px
-    assert verdict.accuracy.ce50_px < verdict.check_ce90_px < verdict.accuracy.ce95_px
-    assert low < verdict.check_ce90_px < high
+    assert verdict.accuracy.ce50_px < verdict.accuracy.ce90_px < verdict.accuracy.ce95_px
+    assert low < verdict.accuracy.ce90_px < high
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -195,7 +195,7 @@ def test_summaries_are_json_whatever_happened() -> None:
         assert summary["points"] == verdict.points
         more = {"points", "chance", "ce90_low_px", "ce90_high_px"}
         more |= {"ellipse_major_px", "ellipse_minor_px", "ellipse_angle_deg"}
-        more |= {"ce50_px", "ce95_px", "heights_px"}
+        more |= {"ce50_px", "ce90_px", "ce95_px", "heights_px"}
         assert set(summary) == set(vars(verdict)) - {"accuracy", "is_final"} | more
     assert LOST.summary()["check_rmse_px"] is None
     assert NOT_JUDGED.summary()["check_rmse_px"] is None

@@ -32,7 +32,7 @@ from groundtie.stac_items import raster_of_item
 
 __all__ = ["context", "textured"]
 
-VERDICT = Verdict(True, "good", fit_points=7, check_rmse_m=4.0, check_ce90_m=2.5)
+VERDICT = Verdict(True, "good", fit_points=7, check_rmse_m=4.0, ce90_m=2.5)
 GRID = utm_grid(30, 20)
 
 

@@ -74,7 +74,7 @@ class TestWithoutGeoreferencing:
         assert verdict["accepted"] and verdict["height"] > 5 and verdict["rival_ratio"] > 1.6
         assert 6 <= verdict["check_points_agreeing"] <= verdict["check_points"]
         # Pixels without georeferencing have no length in metres.
-        assert 0 < verdict["check_ce90_px"] < 3 and verdict["check_ce90_m"] is None
+        assert 0 < verdict["ce90_px"] < 3 and verdict["ce90_m"] is None
         assert not any(" m)" in line for line in result.lines())
         px = np.array([[0.0, 0.0], [159, 0], [0, 149], [159, 149]])
         expected = apply_affine(TRUTH.between((150, 160), (170, 150)), px)

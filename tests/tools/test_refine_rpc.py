@@ -115,7 +115,7 @@ def test_what_displaces_the_match_displaces_the_rpcs(
     )
     assert found.verdict.accuracy.heights_px == pytest.approx(3.0, rel=0.1)
     # Nine tenths of what is even up to 3 px, and what other points would have given.
-    assert 2.7 < found.verdict.check_ce90_px < 3.5
+    assert 2.7 < found.verdict.accuracy.ce90_px < 3.5
 
 
 @pytest.mark.slow

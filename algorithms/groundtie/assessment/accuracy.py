@@ -105,7 +105,6 @@ class Assessment:
             chance = judged.log10_chance
         if not len(judged):
             raise TooFewPointsError(NONE_HELD_OUT)
-        px, metres = judged.in_pixels, judged.in_metres
         ways = {"two-way": self.two_way, "three-way": self.three_way}
         misses = {name: errors.in_pixels.rmse for name, errors in ways.items()}
         evidence = AssessmentEvidence(name, judged, max_error_px, misses, chance)
@@ -115,9 +114,7 @@ class Assessment:
             fit_points_used=int(self.control_points.used.sum()),
             check_points=len(judged),
             check_points_agreeing=int(judged.used.sum()),
-            check_rmse_px=px.rmse,
-            check_rmse_m=metres.rmse,
-            check_ce90_px=px.ce90,
-            check_ce90_m=metres.ce90,
+            check_rmse_px=judged.in_pixels.rmse,
+            check_rmse_m=judged.in_metres.rmse,
             log10_chance=chance,
         )

@@ -32,8 +32,6 @@ class Verdict:
     check_rmse_px, check_rmse_m
         Root mean square error of inliers among the check points, in matching pixels, and in
         metres, unless there is no georeferencing.
-    check_ce90_px, check_ce90_m
-        Radius within which the error of the transform at a random place lies with 90 %.
     log10_chance
         log10 of the probability that random matches would agree as well.
     spread_px
@@ -47,7 +45,9 @@ class Verdict:
     is_final
         Whether nothing else is tried after it: what is accepted, or refused by such a `Rule`.
     accuracy
-        All that is predicted of the error at a random place, unless it was measured.
+        What is predicted of the error of the transform at a random place.
+    ce90_m
+        Its radius of 90 % in metres, unless there is no georeferencing.
     """
 
     accepted: bool
@@ -58,8 +58,6 @@ class Verdict:
     check_points_agreeing: int = 0
     check_rmse_px: float = math.nan
     check_rmse_m: float = math.nan
-    check_ce90_px: float = math.nan
-    check_ce90_m: float = math.nan
     log10_chance: float = 0.0
     spread_px: float = math.nan
     extrapolated_share: float = math.nan
@@ -67,6 +65,7 @@ class Verdict:
     advice: str = ""
     is_final: bool = True
     accuracy: Accuracy = UNKNOWN
+    ce90_m: float = math.nan
 
     @property
     def points(self) -> int:
@@ -85,7 +84,7 @@ class Verdict:
     def accuracy_line(self) -> str:
         """Return the predicted error at a random place, with its interval, as a line of text."""
         (low, high), ellipse = self.accuracy.ce90_range_px, self.accuracy.ellipse
-        ce90 = both_units(self.check_ce90_px, self.check_ce90_m)
+        ce90 = both_units(self.accuracy.ce90_px, self.ce90_m)
         return (
             f"accuracy at a random place: CE90 {ce90}, known to {low:.2f}–{high:.2f} px; 90 % in "
             f"an ellipse of {ellipse.major_px:.2f} × {ellipse.minor_px:.2f} px, longer "
@@ -100,7 +99,7 @@ class Verdict:
         values |= accuracy | {"points": self.points, "chance": self.chance}
         values |= {"ce90_low_px": low, "ce90_high_px": high}
         values |= {f"ellipse_{name}": value for name, value in ellipse.items()}
-        del values["ce90_px"], values["is_final"]
+        del values["is_final"]
         return dict(plain(values))
 
 
@@ -162,9 +161,8 @@ def judge(evidence: EvidenceOfPoints) -> Verdict:
         verdict,
         check_rmse_px=points.rmse_px,
         check_rmse_m=points.rmse_px * metres,
-        check_ce90_px=points.accuracy.ce90_px,
-        check_ce90_m=points.accuracy.ce90_px * metres,
         spread_px=points.spread_px,
         extrapolated_share=evidence.extrapolated_share,
         accuracy=points.accuracy,
+        ce90_m=points.accuracy.ce90_px * metres,
     )

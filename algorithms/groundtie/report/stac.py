@@ -88,7 +88,7 @@ def quality_of(verdict: Verdict, transform: Transform) -> dict[str, Any]:
     """Return the properties of the item of one registration that state how good it is."""
     return {
         "accuracy:geometric_rmse": verdict.check_rmse_m,
-        "groundtie:ce90_m": verdict.check_ce90_m,
+        "groundtie:ce90_m": verdict.ce90_m,
         "groundtie:points": verdict.points,
         "groundtie:model": transform.model.kind,
     }

@@ -97,7 +97,7 @@ class RotationResult:
         Output("DOWN", "Shift downwards", "shift.down"),
         Output("HEIGHT", "Height over chance", "verdict.height"),
         Output("RIVAL_RATIO", "Height over that of the best elsewhere", "verdict.rival_ratio"),
-        Output("CE90_PX", "CE90 of the pose (px)", "verdict.check_ce90_px"),
+        Output("CE90_PX", "CE90 of the pose (px)", "verdict.ce90_px"),
     ),
 )
 def estimate_rotation(

@@ -164,7 +164,7 @@ OutputGrid = Annotated[
 # What a registration returns to QGIS models.
 OUTPUTS = (
     Output("CHECK_RMSE_PX", "Error at check points (px)", "verdict.check_rmse_px"),
-    Output("CHECK_CE90_M", "CE90 of the transform (m)", "verdict.check_ce90_m"),
+    Output("CE90_M", "CE90 of the transform (m)", "verdict.ce90_m"),
     Output("POINTS", "Number of tie points", "verdict.points"),
     Output("REASON", "Reason of the verdict", "verdict.reason", text=True),
 )
