@@ -17,10 +17,17 @@ from .pairs import Pair
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
+# How often what is blurred has the opposite contrast in the input.
+_OPPOSITE = 0.3
+
 
 def _moved(pair: Pair, setting: Setting) -> Pair:
     shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
     return pair.moved(shift, as_text(shift))
+
+
+def _elsewhere(pair: Pair, setting: Setting) -> Pair:
+    return setting.elsewhere(pair)
 
 
 def displaced(draw: Draw) -> Make:
@@ -134,6 +141,24 @@ def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
     return way
 
 
+def softer(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
+    """What is locked is blurred in both images, and sometimes of opposite contrast in one."""
+
+    def way(draw: Draw) -> Make:
+        def make(pair: Pair, setting: Setting) -> Pair:
+            rng, other = setting.rng, ground(pair, setting)
+            px = float(rng.uniform(0.6, 2.2))
+            drawn = draw(other.reference.shape[1:], rng).softer(px)
+            is_opposite = rng.random() < _OPPOSITE
+            in_input = replace(drawn, values=255 - drawn.values) if is_opposite else drawn
+            note = f"blurred by {px:.1f} px" + ", of opposite contrast" * is_opposite
+            return other.changed(drawn.change(), in_input.change(), note)
+
+        return make
+
+    return way
+
+
 def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
     """The same, in pixels of another size."""
     return lambda draw: resampled(way(draw))
@@ -160,8 +185,11 @@ _WAYS = {
     "restyled": restyled,
     "restyled, resampled": on_another_grid(restyled),
     "wider": wider(_moved),
-    "wider, other place": wider(lambda pair, setting: setting.elsewhere(pair)),
+    "wider, other place": wider(_elsewhere),
     "wider, resampled": on_another_grid(wider(_moved)),
+    "softer": softer(_moved),
+    "softer, other place": softer(_elsewhere),
+    "softer, resampled": on_another_grid(softer(_moved)),
 }
 
 # What cannot be done to a function of the whole array.
@@ -173,6 +201,9 @@ _OVERLAYS_ONLY = (
     "wider",
     "wider, other place",
     "wider, resampled",
+    "softer",
+    "softer, other place",
+    "softer, resampled",
 )
 
 # Where more is put in the list of overlays.

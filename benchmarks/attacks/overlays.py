@@ -55,6 +55,13 @@ class Overlay:
         values, alpha = (cv2.dilate(layer, side) for layer in (self.values, self.alpha))
         return replace(self, values=values, alpha=alpha)
 
+    def softer(self, px: float) -> Overlay:
+        """Return it blurred by a Gaussian of a standard deviation, as of a coarser sensor."""
+        alpha, covering = (
+            cv2.GaussianBlur(layer, (0, 0), px) for layer in (self.alpha, self.alpha * self.values)
+        )
+        return replace(self, values=covering / np.maximum(alpha, 1e-6), alpha=alpha)
+
 
 def _moved(
     layer: FloatArray | float, shape: tuple[int, int], right: int, down: int

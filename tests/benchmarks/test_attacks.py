@@ -19,7 +19,7 @@ from benchmarks.attacks import ground, locked, parts, placement, suite
 from benchmarks.attacks.cases import ATTACKS, AttackCase, cases, judge, named
 from benchmarks.attacks.catalogue import CONTROLS, EXAMPLES, LOCKED, Attack, Setting
 from benchmarks.attacks.effects import OF_THE_ARRAY
-from benchmarks.attacks.overlays import OVERLAYS
+from benchmarks.attacks.overlays import OVERLAYS, Overlay
 from benchmarks.attacks.pairs import Pair, Source
 from benchmarks.attacks.scenes import Scene, scenes
 from benchmarks.attacks.sensors import SensorCase
@@ -145,6 +145,20 @@ def test_effects_are_of_the_array(name: str, pair: Pair) -> None:
     np.testing.assert_array_equal(once, again)
     assert once.shape == pair.reference.shape
     assert np.mean(once != pair.reference) > 0.05
+
+
+def test_an_overlay_can_be_blurred() -> None:
+    """A box of one grey value keeps it and what it covers; its rims are as soft as asked for."""
+    alpha = np.zeros((80, 80))
+    alpha[20:60, 20:60] = 1.0
+    soft = Overlay(200.0 * alpha, alpha).softer(2.0)
+    assert soft.alpha.sum() == pytest.approx(alpha.sum(), rel=1e-6)
+    assert soft.values[soft.alpha > 0.01] == pytest.approx(200.0, rel=1e-6)
+    # The standard deviation of the rim's slope is that of the Gaussian.
+    slope = np.diff(soft.alpha[40, :40])
+    at = np.arange(39) + 0.5
+    mean = (at * slope).sum()
+    assert np.sqrt(((at - mean) ** 2 * slope).sum()) == pytest.approx(2.0, rel=0.05)
 
 
 def test_an_overlay_can_be_moved(pair: Pair) -> None:
