@@ -24,6 +24,7 @@ from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
+    LEAST_OF_REST,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
@@ -31,6 +32,7 @@ from groundtie.registration.rules.survey import (
     deviations_elsewhere,
     deviations_of_rest,
     has_few_chips,
+    height_of_else,
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
@@ -100,6 +102,11 @@ def _peak_beyond(evidence: RegistrationEvidence) -> float:
     return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
 
 
+def _height_of_else(evidence: RegistrationEvidence) -> float:
+    height = height_of_else(evidence.surveys.rest)
+    return height if math.isfinite(height) else math.nan
+
+
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
     Statistic(
@@ -112,6 +119,7 @@ STATISTICS = (
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
+    Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
     Statistic(
         "rest elsewhere: second peak",
         REST_PEAK_DEVIATIONS,

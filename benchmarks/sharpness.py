@@ -230,7 +230,7 @@ def run(settings: Settings) -> SuiteResult:
                 most_of_one < VIEW_SHARPNESS,
             ),
             Goal(
-                "Edges beside one another for each on one another, of all ground at its place",
+                "Edges to one side for each on one another, of all ground at its place",
                 f"at most {MOST_BESIDE:g}",
                 f"at most {most_beside:.2f}",
                 most_beside <= MOST_BESIDE,
@@ -294,6 +294,6 @@ def _table(title: str, some: list[Measured]) -> Table:
         rows.append([group, str(len(values)), *numbers, str(evident)])
     columns = (
         *("", "pairs", "least", "median", "most", "at the limit or above"),
-        *("most beside", "evident in all"),
+        *("most to one side", "evident in all"),
     )
     return Table(title, columns, rows)

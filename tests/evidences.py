@@ -132,6 +132,12 @@ def survey(
     return Survey(GRID, centres, shifts, surfaces)
 
 
+def in_common(without_windows: float, without_edges: float) -> Rest:
+    """Return how high chips are without what two sensors' images have in common."""
+    by_windows, by_edges = (survey(height=each) for each in (without_windows, without_edges))
+    return Rest(by_windows, chips=49, is_evident=False, by_edges=by_edges)
+
+
 def facts(
     variation2: float = 0.001,
     strong_share: float = 0.02,

@@ -110,15 +110,15 @@ def test_lines_that_are_drawn_in_other_widths_are_found(
     assert replace(locked, sameness=replace(locked.sameness, **OF_ONE_GROUND)).is_drawn
 
 
-@pytest.mark.parametrize("off_m", [0.0, 3.0, 5.0])
+@pytest.mark.parametrize("off_m", [0.0, 5.0, 10.0, 15.0])
 @pytest.mark.slow
-def test_edges_of_one_ground_lie_on_one_another(
+def test_edges_of_one_ground_lie_to_either_side(
     tmp_path: Path, context: Context, off_m: float
 ) -> None:
-    """Though a transform is half a pixel of 10 m wrong."""
+    """Though a transform is one and a half pixels of 10 m wrong."""
     model = shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, sensed(1), sensed(2), context, model)
-    assert locked is not None and 0 < locked.sameness.beside < 1
+    assert locked is not None and locked.sameness.beside < 0.3
 
 
 def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:

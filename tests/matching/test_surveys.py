@@ -18,6 +18,7 @@ from groundtie.matching.surveys import Rest, survey_rest
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (
+    LEAST_OF_REST,
     REST_PEAK_DEVIATIONS,
     deviations_beyond,
     deviations_elsewhere,
@@ -145,3 +146,19 @@ def test_what_two_radar_images_have_not_in_common_shows_where_a_part_lies(
     assert (deviations_elsewhere(rest.survey) >= REST_PEAK_DEVIATIONS) == is_elsewhere
     shifts = [part.shift_px for part in rest.survey.parts]
     assert shifts == ([pytest.approx((11, -7), abs=0.5)] if is_elsewhere else [])
+
+
+@pytest.mark.parametrize("is_one_place", [True, False])
+def test_what_two_sensors_have_in_common_is_looked_behind(
+    is_one_place: bool, tmp_path: Path, context: Context
+) -> None:
+    """Soft blots over a fifth: beneath them one place in other contrast, or another one."""
+    offset = 0.4, -0.3
+    blots = 4 * ndimage.gaussian_filter((texture(SIDE, SIDE, 30) > 0.9).astype(float), 3)
+    ground = -place() if is_one_place else place()[::-1]
+    input = ndimage.shift(0.6 * ground + blots, offset[::-1], mode="mirror")
+    views = noisy(0.6 * place() + blots, 1, 0.3), noisy(input, 2, 0.3)
+    rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.DIFFERENT)
+    assert rest is not None and rest.survey is not None and rest.by_edges is not None
+    assert (rest.survey.height >= LEAST_OF_REST) == is_one_place
+    assert rest.by_edges.height > rest.survey.height or is_one_place

@@ -23,6 +23,7 @@ from evidences import (
     facts,
     fallen,
     fit_points,
+    in_common,
     points,
     refinement,
     refusing,
@@ -226,6 +227,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
             survey=survey(),
             rest=Rest(survey(part=5, rival=5.0), chips=49, is_evident=False),
         ),
+    ),
+    "nothing else in common": (
+        evidence(GOOD, survey=survey(), rest=in_common(0.9, 0.8)),
+        evidence(GOOD, survey=survey(), rest=in_common(0.8, 1.1)),
     ),
     "ground elsewhere": (
         evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.7)),

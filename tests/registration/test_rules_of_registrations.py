@@ -17,6 +17,7 @@ from evidences import (
     evidence,
     facts,
     fit_points,
+    in_common,
     masked,
     refusing,
     scatter,
@@ -199,6 +200,23 @@ def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
     left.surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = 6.0
     found = evidence(GOOD, survey=survey(), rest=Rest(left, chips=49, is_evident=False))
     assert refusing(found) == ["rest elsewhere"] * is_refused
+
+
+@pytest.mark.parametrize(
+    ("heights", "masks", "is_refused"),
+    [
+        ((0.9, 0.9), {}, True),
+        ((1.1, 0.9), {}, False),
+        ((0.9, 1.1), {}, False),
+        ((0.9, 0.9), {"mask": masked(GROUND)}, False),
+    ],
+)
+def test_what_two_sensors_have_in_common_is_not_all_that_matches(
+    heights: tuple[float, float], masks: dict[str, MaskUsed], is_refused: bool
+) -> None:
+    """What they leave without windows or edges; a town's ground is not asked."""
+    found = evidence(GOOD, survey=survey(), rest=in_common(*heights), **masks)
+    assert refusing(found) == ["nothing else in common"] * is_refused
 
 
 @pytest.mark.parametrize(

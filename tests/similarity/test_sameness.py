@@ -47,8 +47,23 @@ def test_parallel_edges_are_as_far_apart_as_they_are(shift: float) -> None:
     apart = edges_apart_px(rings(25.0), rings(25.0 + shift))
     found = apart[np.isfinite(apart)]
     assert len(found) > 100
-    # Parabolas through three points of each place it to 0.08 px (see the test above).
+    # Parabolas through three points of each place it to 0.08 px (see the test above). The inner
+    # one is brighter outside, where the other lies.
     assert np.median(found) == pytest.approx(shift, abs=0.08)
+
+
+def test_distances_are_negative_on_the_darker_side() -> None:
+    """One lies 1.5 px on the darker side, one 1 px on the brighter."""
+    cols = np.indices((80, 80))[1]
+
+    def steps(*places: float) -> Edges:
+        edges = [erf((cols - place) / 0.6) for place in places]
+        return Edges.of(patch(np.sum(edges, axis=0)))
+
+    alone = steps(40.0)
+    for place in (38.5, 41.0):
+        apart = edges_apart_px(alone, steps(place))[0]
+        assert np.median(apart[np.isfinite(apart)]) == pytest.approx(place - 40, abs=0.1)
 
 
 def test_edges_at_right_angles_are_no_pair() -> None:
@@ -68,8 +83,8 @@ def test_a_copy_moved_by_whole_pixels_coincides_at_that_shift_alone(
     apart = edges_apart_px(one, other, np.array([shift, (shift[0] + 5, shift[1] - 3)]))
     assert apart.shape == (2, one.found.sum())
     # What comes in at the rim changes which of the faintest are edges.
-    assert (apart[0] < 1e-3).mean() > 0.95
-    assert (apart[1] < 0.25).mean() < 0.2
+    assert (np.abs(apart[0]) < 1e-3).mean() > 0.95
+    assert (np.abs(apart[1]) < 0.25).mean() < 0.2
 
 
 def test_the_strongest_edges_are_some_of_all_and_inner_ones_far_from_the_rim() -> None:
@@ -88,16 +103,26 @@ def test_invalid_pixels_hold_no_edges() -> None:
     assert not Edges.of(patch(texture(60, 60), np.s_[:, :])).found.any()
 
 
-def test_windows_are_the_same_where_one_thing_is_drawn_into_both() -> None:
+@pytest.mark.parametrize("scale", [1.0, 1 / 255, 257.0])
+def test_windows_are_the_same_where_one_thing_is_drawn_into_both(scale: float) -> None:
+    """Whatever grey values are a unit of: 8 bits, 16 bits, reflectances."""
     one, other = texture(120, 120, 1), texture(120, 120, 2)
     drawn = 5 * texture(120, 120, 3)
     where = np.s_[40:80, 40:80]
     one[where], other[where] = drawn[where], drawn[where]
-    same = Windows.of(patch(one), patch(other)).same
+    same = Windows.of(patch(one), patch(scale * other)).same
     assert same[46:74, 46:74].all()
     outside = np.ones(same.shape, bool)
     outside[34:86, 34:86] = False
     assert same[outside].mean() < 0.1
+
+
+def test_windows_of_one_grey_value_in_both_are_the_same() -> None:
+    """Also where they are most of the images, whose rounding is no scale."""
+    one, other = np.full((120, 120), 40_000.0), np.full((120, 120), 0.3)
+    one[40:80, 40:80] += 500 * texture(40, 40)
+    other[40:80, 40:80] += 0.01 * texture(40, 40)
+    assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
 
 
 def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:

@@ -17,6 +17,7 @@ from ..context import Context
 from ..geometry.transform import Transform
 from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
+from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
     LOOK_REACH_PX,
@@ -42,6 +43,9 @@ EXACT_PX = 0.0625
 # Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
 _EDGE_SURROUNDINGS_PX = 9
 _SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
+
+# Around a part that is masked, what lies there is looked at, too.
+_RIM_PX = 2 * REACH_PX
 
 
 class Sensors(Enum):
@@ -87,6 +91,11 @@ class LockedContent:
         return self.sameness.is_evident or self.is_exact
 
     @property
+    def may_be_drawn(self) -> bool:
+        """Whether what is the same may be all that matches, though no more than of one ground."""
+        return self.sameness.covers_some and not self.is_explained
+
+    @property
     def is_explained(self) -> bool:
         """Whether the images are copies, or one camera's views of one ground.
 
@@ -116,10 +125,7 @@ class LockedContent:
         or the transform are evidence. If the transform is, what follows in other colours is, too,
         unless nearly everything does.
         """
-        reach = 2 * REACH_PX
-        size = piece.width + 2 * reach, piece.height + 2 * reach
-        around = piece.window(-reach, -reach, *size)
-        patches = Resampled(self.pair, self.to_input).read(around)
+        patches = self._around(piece)
         windows = Windows.of(*patches)
         same = windows.same
         if not self.is_explained:
@@ -130,7 +136,20 @@ class LockedContent:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
             if self.sameness.has_seams:
                 same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
-        return same[reach:-reach, reach:-reach]
+        return _inner(same)
+
+    def around_edges(self, piece: Grid) -> NDArray[np.bool_]:
+        """Return which pixels of a part lie around edges that coincide, whatever else, (h, w)."""
+        return _inner(covered(drawn_edges(*self._around(piece)), _EDGE_SURROUNDINGS_PX))
+
+    def _around(self, piece: Grid) -> tuple[Patch, Patch]:
+        size = piece.width + 2 * _RIM_PX, piece.height + 2 * _RIM_PX
+        around = piece.window(-_RIM_PX, -_RIM_PX, *size)
+        return Resampled(self.pair, self.to_input).read(around)
+
+
+def _inner(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return mask[_RIM_PX:-_RIM_PX, _RIM_PX:-_RIM_PX]
 
 
 def find_locked_content(

@@ -34,6 +34,9 @@ class Rest:
         How many chips there are; of some too little may be left.
     is_evident
         Whether there is more of such content than two views of one ground have in common.
+    by_edges
+        What they show without the surroundings of edges that coincide, of images in which no such
+        content is evident; None: of two radars, and where it is evident.
     """
 
     survey: Survey | None = None
@@ -41,6 +44,7 @@ class Rest:
     beyond: Survey | None = None
     chips: int = 0
     is_evident: bool = True
+    by_edges: Survey | None = None
 
     @property
     def is_drawn(self) -> bool:
@@ -130,26 +134,32 @@ def survey_rest(
 
     Returns
     -------
-    None where there is no more of such content than two views of one ground have, unless both are
-    a radar's: speckle blurs it; and where none is looked for.
+    None where there is hardly any of such content, unless both images are a radar's: speckle blurs
+    it; where the images are one camera's views, which have no more of it than these; and where none
+    is looked for.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     elsewhere_px, exact_px = accuracy_px
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
-    if locked is None or not (locked.is_evident or sensors is Sensors.RADARS):
+    is_speckled = sensors is Sensors.RADARS
+    if locked is None or not (locked.is_evident or locked.may_be_drawn or is_speckled):
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
+    # Another input leaves something else of the reference.
+    once = replace(context, memo=None)
+
+    def left_without(mask: MaskOf) -> Survey:
+        return survey_model(fused, transform.model, places, elsewhere_px, once, mask)
+
     if not locked.is_evident:
-        survey = survey_model(fused, transform.model, places, elsewhere_px, context, locked)
-        return Rest(survey, chips=chips, is_evident=False)
+        by_edges = None if is_speckled else left_without(locked.around_edges)
+        return Rest(left_without(locked), chips=chips, is_evident=False, by_edges=by_edges)
     if locked.is_drawn:
         return Rest()
     left = beyond = None
     if not locked.is_explained or locked.sameness.has_sharp_edges:
-        # Another input leaves something else of the reference.
-        once = replace(context, memo=None)
-        left = survey_model(fused, transform.model, places, elsewhere_px, once, locked)
+        left = left_without(locked)
     if locked.is_explained:
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)

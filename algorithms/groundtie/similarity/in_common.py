@@ -35,19 +35,22 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 
-# Edges of one ground coincide most often where they lie on one another. Those of one thing that is
-# drawn twice, in other widths or as thinner cloud, lie beside one another: as many as on one
-# another, or more, in steps as wide. Where right transforms have it (suites real and attacks,
-# controls): up to 0.8.
+# Edges of one ground lie on one another, and where a transform is wrong beside one another, to
+# either side of their gradients, as these point to all sides. Those of one thing that is drawn
+# twice, in other widths or as thinner cloud, lie to one side: so many more than to the other, in
+# steps as wide, as lie on one another.
 _BESIDE_PX = 1.0, 1.5, float(FARTHEST_PX)
 MOST_BESIDE = 1.0
 
-_NEAR_PX = _SHARP_PX, _BLURRED_PX, *_BESIDE_PX
+_NEAR_PX = np.array([0.0, _SHARP_PX, _BLURRED_PX, *_BESIDE_PX])
 
 # More of the area than this varies alike where holes or waters of one shape are cut into noise, or
 # clouds of one deck lie over both. Different sensors' views of one ground, and those of day and
 # night: up to 25 %, measured on the shared pairs where right transforms have them (suite real).
 _LEAST_AREA = 0.3
+
+# Without less than this, an image shows hardly less.
+_LEAST_PART = 0.05
 
 # One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
 # much smaller, and no less on images reduced once more. Measured as above: 25 % of what is left and
@@ -94,9 +97,9 @@ class Sameness:
     step_width
         See `seams.step_width`.
     beside
-        How many times as many edges lie a half to 1, 1 to 1.5, or 1.5 to 2 pixels beside one
-        another as within a half, or a quarter to a half as within a quarter, whichever is most;
-        beyond chance, and at least, as above.
+        How many more edges lie a half to 1, 1 to 1.5, or 1.5 to 2 pixels to one side of the
+        other's than to its other one, for each within a half; or a quarter to a half, for each
+        within a quarter; whichever is most; at least, as above.
     """
 
     sharpness: float
@@ -113,6 +116,11 @@ class Sameness:
         """Whether more is the same than two views show of one ground."""
         has_edges = self.has_sharp_edges or self.has_edges_beside
         return has_edges or self.area >= _LEAST_AREA or self.has_seams
+
+    @property
+    def covers_some(self) -> bool:
+        """Whether so much is the same that something else is left without it."""
+        return self.area >= _LEAST_PART
 
     @property
     def has_sharp_edges(self) -> bool:
@@ -171,7 +179,8 @@ class Sameness:
         return has_one_ground or self.related >= _GROUND_SHARE
 
 
-_NO_WINDOWS, _NO_EDGES = np.zeros((4, 3), int), np.zeros((len(_OFFSETS), len(_NEAR_PX)), int)
+_NO_WINDOWS = np.zeros((4, 3), int)
+_NO_EDGES = np.zeros((len(_OFFSETS), 2, len(_NEAR_PX) - 1), int)
 
 
 @dataclass(frozen=True)
@@ -181,7 +190,8 @@ class Look:
     Parameters
     ----------
     edges
-        How many lie within each of `_NEAR_PX` of one another, at each of `_OFFSETS`, shape (k, 5).
+        How many lie between each two of `_NEAR_PX` of one another, at each of `_OFFSETS`, on the
+        darker and the brighter side, shape (k, 2, 5).
     windows
         How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
         ones, of those reduced once more, and of reduced ones without what is the same in the
@@ -217,15 +227,16 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
     steps
         Their `step_products`, of the input where it is not resampled if it can be.
     """
-    within = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
-    sharp, blurred, *beside = np.diff(within, axis=1, prepend=0).T
+    edges = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
+    sharp, blurred, *_ = edges.sum(axis=1).T
+    _, to_half, *beside = edges[0].T
     windows = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
     every = windows[:, 2]
     area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
     # Of the images and of reduced ones.
     related = (windows[:, 1] / np.maximum(every, 1))[:2].min()
     return Sameness(
-        _times_as_many(sharp, blurred),
+        float((sharp[0] - sharp[1:].mean()) / _most_of(blurred)),
         float(area),
         float(reduced_area),
         float(coarse_area),
@@ -233,29 +244,31 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         related=float(related),
         step_width=step_width(np.sum(steps, axis=0)) if steps else np.inf,
         beside=max(
-            _times_as_many(blurred, sharp),
-            *(_times_as_many(some, within[:, 1]) for some in beside),
+            _more_of(to_half) / _most_of(sharp),
+            *(_more_of(some) / _most_of(sharp + blurred) for some in beside),
         ),
     )
 
 
-def _times_as_many(some: NDArray[np.int_], others: NDArray[np.int_]) -> float:
-    """Return how many times as many of some edges coincide as of others, at least.
-
-    Each beyond chance, by counts at each of `_OFFSETS`, shape (k,).
-    """
-    chance = others[1:].mean()
+def _most_of(some: NDArray[np.int_]) -> float:
+    """Return how many edges coincide beyond chance, at most, by counts at each of `_OFFSETS`."""
+    chance = some[1:].mean()
     # Of counts, which vary as much as they are many.
-    error = np.sqrt(others[0] + chance / _CHANCE_OFFSETS + 1)
-    most = max(others[0] - chance, 0.0) + STANDARD_ERRORS * error
-    return float((some[0] - some[1:].mean()) / most)
+    error = np.sqrt(some[0] + chance / _CHANCE_OFFSETS + 1)
+    return float(max(some[0] - chance, 0.0) + STANDARD_ERRORS * error)
+
+
+def _more_of(sides: NDArray[np.int_]) -> float:
+    """Return how many more edges lie to one side than to the other, at least, by their counts."""
+    return float(abs(sides[1] - sides[0]) - STANDARD_ERRORS * np.sqrt(sides.sum()))
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
     """Return `Look.edges` of two patches: how many strong edges lie how near to one another."""
     one, other = (Edges.of(patch).strongest for patch in (reference, input))
-    apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _OFFSETS)
-    return np.column_stack([(apart < px).sum(axis=1) for px in _NEAR_PX])
+    apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _OFFSETS)[:, None]
+    sides = np.concatenate([-apart, apart], axis=1)[..., None]
+    return ((sides >= _NEAR_PX[:-1]) & (sides < _NEAR_PX[1:])).sum(axis=2)
 
 
 def drawn_edges(reference: Patch, input: Patch) -> Mask:
@@ -263,5 +276,5 @@ def drawn_edges(reference: Patch, input: Patch) -> Mask:
     one, other = Edges.of(reference), Edges.of(input)
     drawn = np.zeros_like(one.found)
     for edges, others in ((one, other.strongest), (one.strongest, other)):
-        drawn[edges.found] |= edges_apart_px(edges, others)[0] <= _BLURRED_PX
+        drawn[edges.found] |= np.abs(edges_apart_px(edges, others)[0]) <= _BLURRED_PX
     return drawn

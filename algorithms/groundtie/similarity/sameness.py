@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
-from .order_statistics import quantiles
+from .order_statistics import median, quantiles
 
 # Where one thing is drawn into both, their difference varies less than this share of what both
 # vary, in windows of this side; independent content would have it vary as much as both.
 _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
+
+# Less than this share of the largest variance is rounding: windows of one grey value vary by none.
+_ROUNDING = 1e-6
 
 # Edges are maxima of the gradient along itself, after a Gaussian of this scale, against gradients
 # around, above such a share of them: weak ones, and strong ones. Nodata is kept so far away.
@@ -48,27 +51,36 @@ class Windows:
     ----------
     valid
         Where both are.
-    one, other, differing
-        Variances of both, and of their difference.
+    one, other, common
+        Variances of both, and their covariance, the other's grey values in units in which both
+        vary as much in half of the windows.
     """
 
     valid: Mask
     one: FloatImage
     other: FloatImage
-    differing: FloatImage
+    common: FloatImage
 
     @classmethod
     def of(cls, one: Patch, other: Patch) -> Windows:
         """Return the windows of two patches."""
         valid = one.valid & other.valid
         share = np.maximum(_mean(valid.astype(np.float64)), np.finfo(np.float32).eps)
-        images = one.values, other.values, one.values - other.values
-        return cls(valid, *(_variance(image, valid, share) for image in images))
+        first, second = (np.where(valid, patch.values, 0).astype(float) for patch in (one, other))
+        mean, other_mean = (_mean(values) / share for values in (first, second))
+        variance = _variance(first, mean, share)
+        other_variance = _variance(second, other_mean, share)
+        varies = valid & (variance > 0) & (other_variance > 0)
+        common = np.where(varies, _mean(first * second) / share - mean * other_mean, 0)
+        gain = np.sqrt(median(variance[varies] / other_variance[varies])) if varies.any() else 1.0
+        found = variance, gain**2 * other_variance, gain * common
+        return cls(valid, *(np.asarray(image, np.float32) for image in found))
 
     @property
     def same(self) -> Mask:
         """Around which pixels they vary alike."""
-        return self.valid & (self.differing <= _DIFFERING_SHARE * (self.one + self.other))
+        both = self.one + self.other
+        return self.valid & (both - 2 * self.common <= _DIFFERING_SHARE * both)
 
     @property
     def related(self) -> Mask:
@@ -76,8 +88,7 @@ class Windows:
 
         As in copies, also those in other colours.
         """
-        covariance = (self.one + self.other - self.differing) / 2
-        return self.valid & (covariance**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
+        return self.valid & (self.common**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -157,8 +168,8 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
 
     Returns
     -------
-    Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels across the edges; infinite
-    where there is none within two pixels or so.
+    Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels along the gradients of `one`,
+    negative on their darker side; infinite where there is none within two pixels or so.
     """
     reach = int(np.abs(shifts).max()) + FARTHEST_PX
     width = one.found.shape[1] + 2 * reach
@@ -176,11 +187,13 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     right = step_x + other_offset * other_x - offset * x
     down = step_y + other_offset * other_y - offset * y
     is_parallel = np.abs(x * other_x + y * other_y) >= _PARALLEL_COSINE
-    is_pair = is_parallel & (np.abs(right * y - down * x) <= _ALONG_PX)
-    across = np.full((len(shifts), len(rows)), np.inf, np.float32)
-    apart = np.abs(right * x + down * y).astype(np.float32)
-    np.minimum.at(across, (which[is_pair], edge[is_pair]), apart[is_pair])
-    return across
+    pairs = np.flatnonzero(is_parallel & (np.abs(right * y - down * x) <= _ALONG_PX))
+    apart = (right * x + down * y)[pairs]
+    # Of several, the nearest is set last.
+    order = np.argsort(-np.abs(apart), kind="stable")
+    along = np.full((len(shifts), len(rows)), np.inf, np.float32)
+    along[which[pairs][order], edge[pairs][order]] = apart[order]
+    return along
 
 
 def covered(middles: Mask, side_px: int) -> Mask:
@@ -189,14 +202,13 @@ def covered(middles: Mask, side_px: int) -> Mask:
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
 
 
-def _variance(values: FloatImage, valid: Mask, share: FloatArray) -> FloatImage:
-    """Return the variance of valid values in windows around pixels, shape (h, w).
+def _variance(values: FloatArray, mean: FloatArray, share: FloatArray) -> FloatArray:
+    """Return the variance of values in windows around pixels, 0 where it is but rounding, (h, w).
 
-    `share` is that of the windows' pixels that are valid.
+    `share` is that of the windows' pixels that are valid; the values of others are 0.
     """
-    # Of squares of large values, small differences would lose their digits in single precision.
-    known = np.where(valid, values, 0).astype(np.float64)
-    return np.asarray(_mean(known**2) / share - (_mean(known) / share) ** 2, np.float32)
+    variance = _mean(values**2) / share - mean**2
+    return np.where(variance > _ROUNDING * variance.max(initial=0.0), variance, 0.0)
 
 
 def _mean(of: FloatArray) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...geometry.judging import RIVAL_HEIGHT
 from ...matching.parts import LEAST_EXCESS
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
@@ -32,6 +34,12 @@ _LEAST_CHIPS = 0.25
 # 14.3); others from 6.5 on (suites real, calibration of large rural scenes, seeds 440-565, and
 # attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
+
+
+# Of images that are no views of one sensor's, windows that vary alike, and edges that coincide, are
+# little of what matches. Without the ones or the others, right transforms leave 1.1 and more (suite
+# real), what is drawn over other ground mostly up to 0.8.
+LEAST_OF_REST = 1.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -125,7 +133,9 @@ def deviations_of_rest(rest: Rest | None) -> float:
 
     0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
     """
-    left = None if rest is None or rest.is_evident else rest.survey
+    if rest is None or rest.is_evident or rest.by_edges is not None:
+        return 0.0
+    left = rest.survey
     if left is None or not (_has_rival(left) and left.parts):
         return 0.0
     return deviations_elsewhere(left)
@@ -135,6 +145,26 @@ def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if deviations_of_rest(evidence.surveys.rest) < REST_PEAK_DEVIATIONS:
         return None
     return "without what both images have in common, chips all over match elsewhere"
+
+
+def height_of_else(rest: Rest | None) -> float:
+    """Return how high chips are without what two sensors' images have in common.
+
+    Without windows or edges, whichever is higher; infinite where it was not asked.
+    """
+    if rest is None or rest.survey is None or rest.by_edges is None:
+        return math.inf
+    return max(rest.survey.height, rest.by_edges.height)
+
+
+def _nothing_else(evidence: RegistrationEvidence) -> str | None:
+    height = height_of_else(evidence.surveys.rest)
+    if evidence.mask.is_ground or height >= LEAST_OF_REST:
+        return None
+    return (
+        "without what both images have in common, pixel by pixel, chips all over hardly match: "
+        f"{height:.1f} standard deviations"
+    )
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -201,6 +231,17 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _rest_elsewhere,
+        is_final=True,
+    ),
+    Rule(
+        "nothing else in common",
+        "of images that are no two radars' or one camera's, both without windows that vary alike "
+        "and without the surroundings of edges that coincide, the mean similarity of chips all "
+        f"over is below {LEAST_OF_REST:g} robust standard deviations of one of them; unless a mask "
+        "leaves the ground alone",
+        "suites real and attacks",
+        WITHOUT,
+        _nothing_else,
         is_final=True,
     ),
     Rule(
