@@ -85,7 +85,7 @@ def survey_all(
     transform: Transform,
     places: Places,
     accuracy_px: tuple[float, float],
-    sensors: Sensors,
+    sensors: Sensors | None,
     open_ground: MaskOf | None,
     context: Context,
 ) -> Surveys:
@@ -103,7 +103,7 @@ def survey_all(
         Farther than the first from where the transform has all chips lies a second place; within
         the second of whole pixels, it moves the array by these.
     sensors
-        What the images may be.
+        What the images may be; None: one is rendered from heights, and shows nothing drawn.
     open_ground
         Returns which pixels are none, of two radar images; None: it is not asked for.
     context
@@ -111,9 +111,10 @@ def survey_all(
     """
     model, elsewhere_px = transform.model, accuracy_px[0]
     whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
-    part = context.part(0.4, 0.9)
-    rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
-    ground = None
+    rest = ground = None
+    if sensors is not None:
+        part = context.part(0.4, 0.9)
+        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)

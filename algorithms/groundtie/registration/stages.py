@@ -131,7 +131,7 @@ class Stages:
             estimate.transform,
             survey_places(chips.pair.grid),
             (ELSEWHERE_PX, EXACT_PX),
-            self.masked.scene.sensors,
+            None if self.spec.is_rendered else self.masked.scene.sensors,
             self.masked.scene.open_ground if self.masked.used.kind == NONE else None,
             context,
         )
