@@ -125,6 +125,15 @@ def test_windows_of_one_grey_value_in_both_are_the_same() -> None:
     assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
 
 
+@pytest.mark.parametrize("strong", [1e2, 1e3, 1e4])
+def test_a_strong_scatterer_makes_no_window_the_same(strong: float) -> None:
+    """Powers of two radar images, of which one pixel is 33 to 53 dB above the others."""
+    rng = np.random.default_rng(0)
+    one, other = rng.exponential(0.05, (2, 100, 100))
+    one[50, 50] = other[50, 50] = strong
+    assert Windows.of(patch(one), patch(other)).same.mean() == pytest.approx(0.0081, abs=0.001)
+
+
 def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
     rng = np.random.default_rng(4)
     one = texture(120, 120)

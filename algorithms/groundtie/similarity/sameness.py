@@ -23,8 +23,9 @@ _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
-# Less than this share of the largest variance is rounding: windows of one grey value vary by none.
-_ROUNDING = 1e-6
+# A variance below this share of the largest mean of squares is rounding: windows of one grey value
+# vary by none. Sums over some hundred pixels lose up to some hundred units in the last place.
+_ROUNDING = 1000 * np.finfo(np.float64).eps
 
 # Edges are maxima of the gradient along itself, after a Gaussian of this scale, against gradients
 # around, above such a share of them: weak ones, and strong ones. Nodata is kept so far away.
@@ -207,8 +208,9 @@ def _variance(values: FloatArray, mean: FloatArray, share: FloatArray) -> FloatA
 
     `share` is that of the windows' pixels that are valid; the values of others are 0.
     """
-    variance = _mean(values**2) / share - mean**2
-    return np.where(variance > _ROUNDING * variance.max(initial=0.0), variance, 0.0)
+    squares = _mean(values**2) / share
+    variance = squares - mean**2
+    return np.where(variance > _ROUNDING * squares.max(initial=0.0), variance, 0.0)
 
 
 def _mean(of: FloatArray) -> FloatArray:
