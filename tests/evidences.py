@@ -134,8 +134,8 @@ def survey(
 
 def in_common(without_windows: float, without_edges: float) -> Rest:
     """Return how high chips are without what two sensors' images have in common."""
-    by_windows, by_edges = (survey(height=each) for each in (without_windows, without_edges))
-    return Rest(by_windows, chips=49, is_evident=False, by_edges=by_edges)
+    left, other = (survey(height=each) for each in (without_windows, without_edges))
+    return Rest(left, chips=49, is_evident=False, without_edges=other)
 
 
 def facts(

@@ -31,6 +31,7 @@ class TestVerdict:
         assert (verdict.fit_points, verdict.fit_points_used) == (9, 9)
         assert verdict.check_rmse_px == pytest.approx(errors.in_pixels.rmse)
         assert verdict.check_rmse_m == pytest.approx(10 * verdict.check_rmse_px, rel=1e-6)
+        assert errors.in_pixels.ce90 == pytest.approx(2.146 * 0.5, rel=1e-3)
         assert verdict.summary()["chance"] is None
 
     @pytest.mark.parametrize(("length", "accepted"), [(2.999, True), (3.001, False)])

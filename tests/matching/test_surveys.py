@@ -159,6 +159,6 @@ def test_what_two_sensors_have_in_common_is_looked_behind(
     input = ndimage.shift(0.6 * ground + blots, offset[::-1], mode="mirror")
     views = noisy(0.6 * place() + blots, 1, 0.3), noisy(input, 2, 0.3)
     rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.DIFFERENT)
-    assert rest is not None and rest.survey is not None and rest.by_edges is not None
+    assert rest is not None and rest.survey is not None and rest.without_edges is not None
     assert (rest.survey.height >= LEAST_OF_REST) == is_one_place
-    assert rest.by_edges.height > rest.survey.height or is_one_place
+    assert rest.without_edges.height > rest.survey.height or is_one_place

@@ -34,7 +34,7 @@ class Rest:
         How many chips there are; of some too little may be left.
     is_evident
         Whether there is more of such content than two views of one ground have in common.
-    by_edges
+    without_edges
         What they show without the surroundings of edges that coincide, of images in which no such
         content is evident; None: of two radars, and where it is evident.
     """
@@ -44,7 +44,7 @@ class Rest:
     beyond: Survey | None = None
     chips: int = 0
     is_evident: bool = True
-    by_edges: Survey | None = None
+    without_edges: Survey | None = None
 
     @property
     def is_drawn(self) -> bool:
@@ -154,8 +154,10 @@ def survey_rest(
         return survey_model(fused, transform.model, places, elsewhere_px, once, mask)
 
     if not locked.is_evident:
-        by_edges = None if is_speckled else left_without(locked.around_edges)
-        return Rest(left_without(locked), chips=chips, is_evident=False, by_edges=by_edges)
+        without_edges = None if is_speckled else left_without(locked.around_edges)
+        return Rest(
+            left_without(locked), chips=chips, is_evident=False, without_edges=without_edges
+        )
     if locked.is_drawn:
         return Rest()
     left = beyond = None

@@ -133,7 +133,7 @@ def deviations_of_rest(rest: Rest | None) -> float:
 
     0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
     """
-    if rest is None or rest.is_evident or rest.by_edges is not None:
+    if rest is None or rest.is_evident or rest.without_edges is not None:
         return 0.0
     left = rest.survey
     if left is None or not (_has_rival(left) and left.parts):
@@ -152,9 +152,9 @@ def height_of_else(rest: Rest | None) -> float:
 
     Without windows or edges, whichever is higher; infinite where it was not asked.
     """
-    if rest is None or rest.survey is None or rest.by_edges is None:
+    if rest is None or rest.survey is None or rest.without_edges is None:
         return math.inf
-    return max(rest.survey.height, rest.by_edges.height)
+    return max(rest.survey.height, rest.without_edges.height)
 
 
 def _nothing_else(evidence: RegistrationEvidence) -> str | None:
@@ -237,8 +237,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "nothing else in common",
         "of images that are no two radars' or one camera's, both without windows that vary alike "
         "and without the surroundings of edges that coincide, the mean similarity of chips all "
-        f"over is below {LEAST_OF_REST:g} robust standard deviations of one of them; unless a mask "
-        "leaves the ground alone",
+        f"over is below {LEAST_OF_REST:g} times the robust standard deviation of one of them; "
+        "unless a mask leaves the ground alone",
         "suites real and attacks",
         WITHOUT,
         _nothing_else,
