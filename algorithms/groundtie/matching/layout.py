@@ -30,6 +30,9 @@ _FEWEST_CELLS, _MOST_CELLS = 3, 6
 _CHIP_RANGE_PX = (24, 80)
 _LARGEST_CHECK_CHIP_PX = 112
 
+# Of the smallest chips, two cells and the rim.
+_LEAST_OVERLAP_PX = round(_CHIP_RANGE_PX[0] * (1 + 2 / (1 - _HELD_OUT)))
+
 # Above so many chips of the fit they are laid out half as densely.
 _MANY_CHIPS = 200
 
@@ -167,16 +170,16 @@ def lay_out_chips(pair: ImagePair) -> ChipLayout:
     Raises
     ------
     NoOverlapError
-        The overlap is too small for a single cell of chips.
+        The overlap is too small for two cells of chips each way.
     """
-    chip = default_chip_px(*pair.overlap_px)
-    smallest_pitch = chip / (1 - _HELD_OUT)
-    if min(pair.overlap_px) < chip + 2 * smallest_pitch:
+    if min(pair.overlap_px) < _LEAST_OVERLAP_PX:
         raise NoOverlapError(
             f"{pair.input.source.path} and {pair.reference.source.path} overlap by "
-            f"{pair.overlap_px[0]} × {pair.overlap_px[1]} matching pixels, too little for chips "
-            f"of {chip}"
+            f"{pair.overlap_px[0]} × {pair.overlap_px[1]} matching pixels; at least "
+            f"{_LEAST_OVERLAP_PX} × {_LEAST_OVERLAP_PX} are needed"
         )
+    chip = default_chip_px(*pair.overlap_px)
+    smallest_pitch = chip / (1 - _HELD_OUT)
 
     def layout(parts: int) -> ChipLayout:
         axes = []
