@@ -14,6 +14,7 @@ import groundtie
 from groundtie.arrays import Raster
 from groundtie.context import threads
 from groundtie.geometry.chance import agreement_probability, log10_chance
+from groundtie.geometry.judging import LARGEST_LOG10_CHANCE
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.parts import ELSEWHERE_PX
@@ -136,8 +137,9 @@ def verdict(_: Scenes) -> Figure:
         probability = agreement_probability(2.0, radius)
         log10 = [log10_chance(int(k), 16, probability) for k in count]
         axes[1].plot(count, log10, "o-", color=colour, markersize=3, label=f"± {radius} px")
-    axes[1].axhline(-3, color=ORANGE, linewidth=1)
-    axes[1].text(16, -2.6, "refused above", color=ORANGE, fontsize=8, ha="right")
+    limit = LARGEST_LOG10_CHANCE
+    axes[1].axhline(limit, color=ORANGE, linewidth=1)
+    axes[1].text(16, limit + 0.4, "refused above", color=ORANGE, fontsize=8, ha="right")
     axes[1].axis("on")
     axes[1].tick_params(labelsize=7)
     axes[1].set(ylim=(-20, 0.5), xlim=(0.5, 16.5))

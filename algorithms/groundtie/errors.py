@@ -48,7 +48,7 @@ class MemoryLimitError(GroundTieError, MemoryError):
 
 
 class NoOverlapError(GroundTieError, ValueError):
-    """Reference and input do not overlap."""
+    """Two rasters do not overlap, or not enough."""
 
 
 class SameFileError(GroundTieError, ValueError):
@@ -60,7 +60,7 @@ class OutputError(GroundTieError, OSError):
 
 
 class TransformFileError(GroundTieError, ValueError):
-    """A transform or tie-point file cannot be understood."""
+    """A file of a transform, of tie points or of control points cannot be understood."""
 
 
 class VectorLayerError(GroundTieError, ValueError):
@@ -89,8 +89,6 @@ class WorkerLostError(GroundTieError, ChildProcessError):
 
 class CancelledError(GroundTieError, RuntimeError):
     """The user cancelled the work."""
-
-    exit_code = 130
 
 
 class Refusal(Protocol):

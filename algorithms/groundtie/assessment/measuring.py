@@ -14,7 +14,6 @@ from ..errors import (
     GeoreferencingError,
     ParameterError,
     TooFewPointsError,
-    TransformFileError,
 )
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.tie_points import NONE_HELD_OUT, TiePoints
@@ -189,8 +188,6 @@ def read_points(path: Path, transform: Transform) -> TiePoints:
     points = read_tie_points(path, transform.input_grid, table_crs=transform.crs)
     if not points.used.any():
         raise TooFewPointsError(f"{path} holds no points that are used")
-    if not np.isfinite([*points.reference_xy, *points.input_px]).all():
-        raise TransformFileError(f"{path} holds positions that are not finite")
     require_both_or_none(points.crs, transform.crs, f"{path} and the transform")
     xy = reproject(points.reference_xy, points.crs, transform.crs)
     if not np.isfinite(xy).all():

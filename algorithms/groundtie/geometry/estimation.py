@@ -13,7 +13,7 @@ from ..rasters.grid import FloatArray, Grid, PointFunction
 from ..rasters.pair import ImagePair
 from .fitting import fit_model
 from .model_choice import left_out_blocks
-from .models import Frame, Model
+from .models import Frame, Model, fewest_points
 from .robust import fit_robustly
 from .tie_points import TiePoints
 from .transform import Transform
@@ -162,7 +162,7 @@ def fit_thin_plate(
     used = points.take(points.used)
     px = grid.map_to_pixel(used.reference_xy)
     nominal_px = grid.map_to_pixel(used.nominal_xy(nominal))
-    if len(used) < 4:
+    if len(used) < fewest_points("tps"):
         raise TooFewPointsError(f"only {len(used)} points were matched")
     variances = np.trace(used.covariance_px2, axis1=1, axis2=2) / 2
     area = (2 * radius_px + 1) ** 2

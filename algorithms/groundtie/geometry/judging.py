@@ -1,4 +1,6 @@
-"""The numbers by which registrations are accepted or refused, in the one place where they stand.
+"""The numbers by which tie points and transforms are judged, wherever that is done.
+
+Those of one rule alone stand beside it (`registration.rules`).
 
 Agreement is believed where it would be too unlikely by chance. Source: [Moisan2004]; the numbers
 were chosen on the shared pairs, as docs/method-verdict.md has it.

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from ..rasters.grid import FLATTENING
 from ..strict_json import read_json
 
 RADAR, CAMERA = "radar", "camera"
@@ -26,9 +27,6 @@ _IMD = re.compile(r"\b(mean(?:Sat|Sun)(?:Az|El))\s*=\s*(-?\d[\d.eE+-]*)", re.IGN
 
 # A larger file is none of metadata.
 _LARGEST_BYTES = 100_000_000
-
-# Of the Earth's ellipsoid of WGS 84.
-_FLATTENING = 1 / 298.257223563
 
 
 def metadata_beside(image: Path) -> Iterator[Path]:
@@ -128,7 +126,7 @@ def _azimuth_deg(ground: Any, sensor: Any) -> float:
     x, y, z = (float(value) for value in ground)
     east = np.array([-y, x, 0.0]) / np.hypot(x, y)
     # On the ground the normal of the ellipsoid has this latitude.
-    latitude = np.arctan2(z, (1 - _FLATTENING) ** 2 * np.hypot(x, y))
+    latitude = np.arctan2(z, (1 - FLATTENING) ** 2 * np.hypot(x, y))
     longitude = np.arctan2(y, x)
     north = np.array(
         [

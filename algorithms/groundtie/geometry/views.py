@@ -6,6 +6,7 @@ or by a product's own metadata (`product_views`).
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from collections.abc import Mapping
@@ -16,6 +17,8 @@ from typing import Any
 from ..errors import ParameterError
 from ..strict_json import read_json
 from .product_views import CAMERA, RADAR, metadata_beside, read_product_view
+
+_LOG = logging.getLogger(__name__)
 
 SENSORS = (RADAR, CAMERA)
 
@@ -179,7 +182,8 @@ def _product_view(path: Path) -> View | None:
         return None
     try:
         stated = read_product_view(path)
-    except (OSError, ValueError):
+    except (OSError, ValueError) as error:
+        _LOG.info("%s states no view: %s", path, error)
         return None
     return None if stated is None else _view(*stated, str(path))
 

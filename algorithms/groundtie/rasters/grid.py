@@ -40,8 +40,9 @@ _LEAST_SHRINK = 1e-6
 # The name of a datum and the parameters that lead to WGS 84, in WKT 1.
 _DATUM = re.compile(r'DATUM\["[^"]*"|TOWGS84\[[^]]*\]')
 
-# The ellipsoid of WGS 84: equatorial radius, and square of the eccentricity.
-_RADIUS_M, _ECCENTRICITY2 = 6_378_137.0, 0.00669437999014
+# The ellipsoid of WGS 84: equatorial radius, flattening, and square of the eccentricity.
+_RADIUS_M, FLATTENING = 6_378_137.0, 1 / 298.257223563
+_ECCENTRICITY2 = FLATTENING * (2 - FLATTENING)
 
 # Steps over which the length of a map's units is measured.
 _STEP_M = 1000.0

@@ -96,7 +96,7 @@ def has_own_mask(flags: Collection[MaskFlags], nodata: float | None) -> bool:
 def tags_of(dataset: Any, **which: Any) -> dict[str, str]:
     """Return the tags of a domain (`ns`) or band (`bidx`) of a rasterio dataset.
 
-    None where they are no UTF-8: then nobody can read them.
+    Empty where they are no UTF-8: then nobody can read them.
     """
     try:
         return dict(stated(lambda: dataset.tags(**which)))

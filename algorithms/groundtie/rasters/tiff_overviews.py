@@ -87,7 +87,7 @@ class Reduced:
     def _means(
         self, dataset: Any, bands: list[int], window: Window
     ) -> tuple[NDArray[Any], Mask] | None:
-        """Return the same of usual pixels, in a tenth of the time; None: they are not."""
+        """Return the same of usual types, without GDAL; None: they are not."""
         if dataset.dtypes[0] not in _MEANS:
             return None
         made = self.level

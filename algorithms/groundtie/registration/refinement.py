@@ -238,7 +238,7 @@ class RefinedRpc:
         )
         kept = points.reject(blunders, "blunder")
         above = _median_above(kept, image.orientation.heights) if found is None else None
-        heights = check_heights(image.orientation, control, adjustment, above)
+        heights = check_heights(image.orientation, control.size, above)
         mask = None if found is None else found.registration.mask
         own, ground = image.source.grid.on_own_pixels(), image.heights
         verdict = judge(evidence)

@@ -2,8 +2,8 @@
 
 All heights being wrong by the same moves the image positions by nearly the same everywhere, as a
 shift of the RPCs does, whatever the relief: a refinement takes it up, and residuals do not show
-it. What may show it are the range of heights that the RPCs were made for, heights that the control
-points themselves have, and, with a wide field of view only, how the effect varies over the image.
+it. What may show it are the range of heights that the RPCs were made for, and heights that the
+control points themselves have.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ import numpy as np
 
 from ..errors import GroundTieError
 from ..rasters.reading import open_raster
-from .adjustment import SMALLEST_SIGMA_PX, Adjustment, Control
-from .bias import KINDS, design
 from .geoids import find_geoid
 from .heights import ConstantHeight, surface_over
 from .orientation import FloatArray, Orientation, seen_at
@@ -27,11 +25,6 @@ _OFFSET_M = 10.0
 
 # Ground beyond the RPCs' range of heights must be so, too, by more than this share of its half.
 _BEYOND_SHARE = 0.05
-
-# An offset by residuals is reported if it is larger than so many standard deviations, and if the
-# largest offset of a vertical datum (EGM96: 107 m) would be larger than so many, too.
-_SIGMAS = 4.0
-_LARGEST_DATUM_M = 110.0
 
 # Shares of the ground that are left out at both ends of its range.
 _TAIL = 0.01
@@ -49,9 +42,6 @@ class HeightCheck:
         Lowest and highest height that the RPCs were made for.
     geoid_m
         Height of the geoid EGM96 above the ellipsoid; None: its grid is not installed.
-    offset_m, offset_sigma_m
-        What would have to be added to all heights, by the residuals of the control points, and
-        its standard deviation, which is large: see above.
     control_offset_m
         Median of the control points' own heights minus the ground's; None: they have none.
     """
@@ -59,8 +49,6 @@ class HeightCheck:
     ground_m: tuple[float, float]
     range_m: tuple[float, float]
     geoid_m: float | None
-    offset_m: float | None = None
-    offset_sigma_m: float | None = None
     control_offset_m: float | None = None
 
     @property
@@ -92,24 +80,11 @@ class HeightCheck:
                 f"the control points lie {self.control_offset_m:+.0f} m from the ground of the "
                 "terrain model: is the vertical datum right?"
             )
-        if (
-            self.offset_m is not None
-            and self.offset_sigma_m is not None
-            and _SIGMAS * self.offset_sigma_m < _LARGEST_DATUM_M
-            and abs(self.offset_m) > max(_SIGMAS * self.offset_sigma_m, _OFFSET_M)
-        ):
-            found.append(
-                f"by the residuals all heights are wrong by {self.offset_m:+.0f} ± "
-                f"{self.offset_sigma_m:.0f} m: is the vertical datum right?"
-            )
         return found
 
 
 def check_heights(
-    orientation: Orientation,
-    control: Control,
-    adjustment: Adjustment,
-    control_offset_m: float | None = None,
+    orientation: Orientation, size: tuple[int, int], control_offset_m: float | None
 ) -> HeightCheck:
     """Check the heights of an orientation.
 
@@ -117,26 +92,19 @@ def check_heights(
     ----------
     orientation
         How the image sees the ground.
-    control, adjustment
-        Control points of the image and what was fitted to them.
+    size
+        Width and height of the image, in pixels.
     control_offset_m
         See `HeightCheck`.
     """
     rpc = orientation.rpc
-    seen = seen_at(rpc, control.size, orientation.heights.typical_m, 33)
+    seen = seen_at(rpc, size, orientation.heights.typical_m, 33)
     heights = orientation.heights.at(seen)
     heights = heights[np.isfinite(heights)]
     low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
-    offset, sigma = _offset(orientation, control, adjustment)
     constant = isinstance(orientation.heights, ConstantHeight)
-    return HeightCheck(
-        (low, high),
-        rpc.heights_m(),
-        None if constant else _geoid(seen),
-        offset,
-        sigma,
-        control_offset_m,
-    )
+    geoid_m = None if constant else _geoid(seen)
+    return HeightCheck((low, high), rpc.heights_m(), geoid_m, control_offset_m)
 
 
 def _geoid(lon_lat: FloatArray) -> float | None:
@@ -147,31 +115,3 @@ def _geoid(lon_lat: FloatArray) -> float | None:
             return float(np.nanmean(surface_over(source, lon_lat).at(lon_lat)))
     except GroundTieError:
         return None
-
-
-def _offset(
-    orientation: Orientation, control: Control, adjustment: Adjustment
-) -> tuple[float, float] | tuple[None, None]:
-    """Return what residuals indicate of a common error of all heights, and its standard deviation.
-
-    None: nothing. Beside an affine bias, whatever was fitted: what a bias leaves must not look like
-    heights.
-    """
-    used = control.take(adjustment.used)
-    height = orientation.heights.typical_m
-    ground = orientation.rpc.localise(used.expected_px, height)
-    slope = orientation.rpc.derivatives(ground, height)[:, :, 2]
-    terms = np.kron(design(KINDS[-1], used.size, used.expected_px), np.eye(2))
-    sigma = max(adjustment.sigma_px, SMALLEST_SIGMA_PX)
-    covariance = used.covariance_px2 + sigma**2 * np.eye(2)
-    root = np.linalg.cholesky(np.linalg.inv(covariance)).swapaxes(1, 2)
-    weighted = (root @ terms.reshape(len(used), 2, -1)).reshape(2 * len(used), -1)
-    by_bias = np.linalg.qr(weighted)[0]
-    by_height = (root @ slope[:, :, None]).ravel()
-    for _ in range(2):  # once is not exact: next to all of it is like a bias
-        by_height = by_height - by_bias @ (by_bias.T @ by_height)
-    found = (root @ (used.found_px - used.expected_px)[:, :, None]).ravel()
-    length = float(np.linalg.norm(by_height))
-    if length == 0:
-        return None, None
-    return float(by_height @ found) / length**2, 1 / length

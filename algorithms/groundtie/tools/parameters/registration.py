@@ -137,8 +137,8 @@ _VIEWS = (
     "(.json, .xml, .imd), or words, that "
     "of the reference first, as in 'radar azimuth=280 incidence=35; camera azimuth=250 "
     "incidence=12 sun-azimuth=155 sun-elevation=48'. Azimuths from the ground to the sensor or "
-    "sun, clockwise from north, incidence from the vertical. By default the STAC items of the "
-    "images' own names beside them."
+    "sun, clockwise from north, incidence from the vertical. By default what lies beside each "
+    "image: a STAC item of its own name, or its product's metadata."
 )
 _TERRAIN_VIEW = (
     "If the reference is a terrain model, how it is rendered: 'terrain sun azimuth=155' for a "
