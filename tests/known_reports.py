@@ -182,7 +182,7 @@ def registration_of(
         transform=transform,
         correction=None if transform is None else Correction.of(transform, pair.grid),
         extreme_surfaces=lambda: surfaces,
-        scene=SimpleNamespace(facts=lambda: scene),
+        scene=SimpleNamespace(facts=lambda: scene, summary=lambda: {"sensors": "cameras"}),
         evidence=SimpleNamespace(surveys=Surveys(survey)),
         **more,
     )

@@ -86,6 +86,15 @@ def test_what_is_rendered_and_what_stands_are_of_metres(tmp_path: Path, form: st
         np.testing.assert_allclose(found_m.surface_m, expected_m.surface_m, atol=1e-3)
 
 
+def test_other_bands_are_no_heights(tmp_path: Path) -> None:
+    """As a band of errors or of sources, which many products have beside their heights."""
+    grid = {"transform": Affine(10, 0, 4e5, 0, -10, 5e6), "crs": UTM}
+    heights = np.stack([np.full((30, 40), height, np.float32) for height in (30, 100)])
+    source = open_raster(Raster(heights, **grid))
+    found, _ = RasterModel(source).heights(source.grid)
+    np.testing.assert_array_equal(found.surface_m, 30)
+
+
 def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
     path = stored(tmp_path / "dem.tif", "metres")
     with rasterio.open(path, "r+") as dataset:

@@ -142,7 +142,7 @@ def test_facts_about_the_images(pair: ImagePair, tmp_path: Path) -> None:
     page = written(refused(pair, scene={"reference": "radar, 1 look", "urban": None}), tmp_path)
     assert "The images" in [e.text for e in page.all("h2")]
     assert {"radar, 1 look", "–"} <= {e.text for e in page.all("td")}
-    assert numbers_in(tmp_path)["scene"] == {"reference": "radar, 1 look", "urban": None}
+    assert numbers_in(tmp_path)["scene"] == {"sensors": "cameras"}
 
 
 def test_what_was_tried_before(pair: ImagePair, tmp_path: Path) -> None:

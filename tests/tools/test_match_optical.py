@@ -24,6 +24,7 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.masks import ground
+from groundtie.matching.locked import Sensors
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration import pipeline
 from groundtie.registration.rules import scene as scene_rules
@@ -105,7 +106,8 @@ def test_a_radar_image_that_may_show_a_town_is_in_doubt(
     files: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_radar: bool
 ) -> None:
     """Refused as a whole, it is tried by its ground, which counts."""
-    monkeypatch.setattr(SceneInfo, "is_radar_and_camera", is_radar)
+    sensors = Sensors.DIFFERENT if is_radar else Sensors.CAMERAS
+    monkeypatch.setattr(SceneInfo, "sensors", sensors)
     monkeypatch.setattr(SceneInfo, "is_despeckled_town", False)
     # Too few strong scatterers for a town, too many for one to be ruled out.
     monkeypatch.setattr(ImageFacts, "strong_share", 0.1)

@@ -54,16 +54,16 @@ class RasterModel:
     raster
         The heights.
     band
-        Number of their band, from 1; None: the mean of all.
+        Number of their band, from 1.
     """
 
     raster: RasterSource
-    band: int | None = None
+    band: int = 1
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found in it."""
         stored, known = sampled_onto(piece, self.raster, "bilinear", self.band)
-        surface = in_metres(stored, self.raster, self.band or 1)
+        surface = in_metres(stored, self.raster, self.band)
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
         ground = bare_ground(surface, known, piece.pixel_size_m)

@@ -8,7 +8,7 @@ images that share them match there, whatever ground they show.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +51,9 @@ _RIM_PX = 2 * REACH_PX
 class Sensors(Enum):
     """What sensors the images may be of."""
 
-    CAMERAS = auto()
-    RADARS = auto()
-    DIFFERENT = auto()
+    CAMERAS = "cameras"
+    RADARS = "radars"
+    DIFFERENT = "radar and camera"
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import AUTO
+from ..matching.locked import Sensors
 from ..progress import SILENT, Progress
 from ..rasters.reading import open_raster
 from ..sensor.rpc_files import rpc_of
@@ -65,9 +66,9 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
         Whether they have georeferencing.
     """
     chips = Try("coregister", COREGISTER, "other images match by chips")
-    if scene.is_radar_and_camera:
+    if scene.sensors is Sensors.DIFFERENT:
         tries = [replace(chips, because="a radar image and a camera's match by chips")]
-    elif scene.are_both_radar:
+    elif scene.sensors is Sensors.RADARS:
         because = "both images are a radar's, which share keypoints"
         tries = [Try("match_sar_sar", SAR_SAR, because), chips]
     else:

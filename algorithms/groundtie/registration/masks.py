@@ -13,6 +13,7 @@ from ..context import Context
 from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
 from ..masks.used import GROUND, OPEN, REFERENCE, MaskUsed
+from ..matching.locked import Sensors
 from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask
@@ -83,7 +84,7 @@ def with_ground_mask(
     context
         Threads and progress.
     """
-    if not scene.is_radar_and_camera:
+    if scene.sensors is not Sensors.DIFFERENT:
         return Masked(pair, scene, MaskUsed.none("there is no radar image beside a camera's"))
     if not scene.is_town:
         reason = f"{_shown(scene)}: too few for a town"
@@ -115,7 +116,7 @@ def ground_instead(
         used = MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX)
         is_part = not used.leaves_little and share <= _MOST_OPEN
         return Masked(image, scene, used) if is_part else None
-    if scene.is_radar_and_camera and scene.may_be_town and scene.shows_ground:
+    if scene.sensors is Sensors.DIFFERENT and scene.may_be_town and scene.shows_ground:
         return _of_town(pair, scene, stack, context)
     return None
 

@@ -18,6 +18,7 @@ from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
 from ..masks.used import MaskUsed
+from ..matching.locked import Sensors
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
 from ..matching.survey import SURVEY_RADIUS_PX
 from ..matching.surveys import Surveys
@@ -201,7 +202,7 @@ def confirm_pose(
     scene = SceneInfo.of(pair)
     transform = windows.transform(pose)
     found = survey_pose(pair, transform, SAME_SHARE, scene.sensors, scene.open_ground, context)
-    factor = CHIPS_MEAN_OVER_SCATTER if scene.are_both_radar else None
+    factor = CHIPS_MEAN_OVER_SCATTER if scene.sensors is Sensors.RADARS else None
     moved = windows.pose(found.transform)
     grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)
     is_shift = moved_px(moved, shift, (grid.height, grid.width)) <= POSE_TOLERANCE_PX

@@ -282,11 +282,7 @@ class Registration:
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
-        return {
-            **self.page().summary(),
-            "scene": self.scene.summary(),
-            "files": given_files(self.files),
-        }
+        return {**self.page().summary(), "files": given_files(self.files)}
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""

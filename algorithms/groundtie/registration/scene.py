@@ -148,34 +148,27 @@ class SceneInfo:
         return self.input if self.radar_name == REFERENCE else self.reference
 
     @cached_property
-    def is_radar_and_camera(self) -> bool:
-        """Whether one image is a radar's, and the other is a camera's.
+    def sensors(self) -> Sensors:
+        """What the images are: as declared, else by metadata and speckle.
 
-        It has the speckle of a radar's, and the other far less of it; or its metadata name one,
-        and the other has no speckle.
+        Where neither is declared to be a radar's, both may be rough, but not one alone.
         """
+        if self.declared == BOTH:
+            return Sensors.RADARS
         if self.declared in (REFERENCE, INPUT):
-            return True
+            return Sensors.DIFFERENT
         radar, other = self.radar, self.other
-        if other.is_known_radar:
-            return False
-        if radar.is_known_radar:
-            return not other.has_speckle
-        return radar.has_speckle and radar.variation2 >= LEAST_VARIATION2_RATIO * other.variation2
-
-    @cached_property
-    def are_both_radar(self) -> bool:
-        """Whether both images have the speckle of a radar's, or metadata that name one."""
-        return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
+        if not (radar.is_known_radar or radar.has_speckle):
+            return Sensors.CAMERAS
+        if not radar.is_known_radar and self._is_far_rougher:
+            return Sensors.DIFFERENT
+        if other.is_known_radar or other.has_speckle:
+            return Sensors.CAMERAS if self.declared == NEITHER else Sensors.RADARS
+        return Sensors.DIFFERENT if radar.is_known_radar else Sensors.CAMERAS
 
     @property
-    def sensors(self) -> Sensors:
-        """What the images may be: a camera's unless they are known to be a radar's."""
-        if self.declared == BOTH or (self.declared != NEITHER and self.are_both_radar):
-            return Sensors.RADARS
-        if self.declared != NEITHER and self.is_radar_and_camera:
-            return Sensors.DIFFERENT
-        return Sensors.CAMERAS
+    def _is_far_rougher(self) -> bool:
+        return self.radar.variation2 >= LEAST_VARIATION2_RATIO * self.other.variation2
 
     @property
     def open_ground(self) -> OpenGround | None:
@@ -185,7 +178,7 @@ class SceneInfo:
     @property
     def is_town(self) -> bool:
         """Whether the radar image of a pair with a camera's shows a town."""
-        return self.is_radar_and_camera and self.radar.strong_share >= TOWN_SHARE
+        return self.sensors is Sensors.DIFFERENT and self.radar.strong_share >= TOWN_SHARE
 
     @property
     def shows_ground(self) -> bool:
@@ -208,9 +201,9 @@ class SceneInfo:
         Without its speckle a radar image cannot be distinguished from a camera's, with fewer
         strong scatterers; both images are checked then, unless they are declared to be a camera's.
         """
-        if self.are_both_radar:
+        if self.sensors is Sensors.RADARS:
             return False
-        if self.is_radar_and_camera:
+        if self.sensors is Sensors.DIFFERENT:
             return self.radar.strong_share >= PERHAPS_TOWN_SHARE
         suspects = () if self.declared == NEITHER else (self.reference, self.input)
         return any(one.strong_share >= PERHAPS_TOWN_SHARE for one in suspects)
@@ -222,7 +215,7 @@ class SceneInfo:
         Speckle filters leave no number of looks, and smooth roofs as they smooth the ground. A mask
         of the user's needs no speckle.
         """
-        is_despeckled = self.is_radar_and_camera and not self.radar.has_speckle
+        is_despeckled = self.sensors is Sensors.DIFFERENT and not self.radar.has_speckle
         return is_despeckled and self.may_be_town and not self.has_user_mask
 
     def summary(self) -> dict[str, Any]:
@@ -234,15 +227,16 @@ class SceneInfo:
             if values:
                 found[name] = values
         known = vars(self)
-        return found | {key: known[key] for key in _PAIR_FACTS if key in known}
+        if "sensors" in known:
+            found["sensors"] = self.sensors.value
+        return found | {key: known[key] for key in ("radar_name",) if key in known}
 
     def facts(self) -> dict[str, str]:
         """Return the facts that were found, in words for people; nothing is read."""
-        known = vars(self)
-        if known.get("are_both_radar"):
-            return {"images": "both are a radar's"}
-        if not known.get("is_radar_and_camera"):
+        if "sensors" not in vars(self) or self.sensors is Sensors.CAMERAS:
             return {}
+        if self.sensors is Sensors.RADARS:
+            return {"images": "both are a radar's"}
         facts = {"radar image": self.radar_name}
         radar = vars(self.radar)
         if "variation2" in radar:
@@ -253,7 +247,6 @@ class SceneInfo:
 
 
 _FACTS = ("is_known_radar", "variation2", "strong_share")
-_PAIR_FACTS = ("radar_name", "is_radar_and_camera", "are_both_radar")
 
 
 def scene_of(pair: ImagePair, name: str) -> Scene:

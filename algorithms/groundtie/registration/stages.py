@@ -18,7 +18,7 @@ from ..matching.chips import ChipMatcher
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import GuidedFit, KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import EXACT_PX
+from ..matching.locked import EXACT_PX, Sensors
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
@@ -33,7 +33,7 @@ from .evidence import RegistrationEvidence
 from .layover import CHIPS_MEAN_OVER_SCATTER, KEYPOINTS_MEAN_OVER_SCATTER
 from .masks import Masked
 from .opening import open_terrain
-from .specification import BOTH, CHIPS, KEYPOINTS, Specification
+from .specification import CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
 
@@ -139,7 +139,6 @@ class Stages:
     def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
         """Return what the rules look at."""
         scene = self.masked.scene
-        is_radar = self.spec.radar == BOTH or scene.are_both_radar
         factor = (
             KEYPOINTS_MEAN_OVER_SCATTER
             if self.spec.matcher == KEYPOINTS
@@ -153,7 +152,7 @@ class Stages:
             check.points,
             self.masked.pair.grid,
             self.spec.tries,
-            factor if is_radar else None,
+            factor if scene.sensors is Sensors.RADARS else None,
             surveys,
             self._input_fit(estimate),
         )

@@ -116,7 +116,7 @@ def fitted_ground(
 
 def rendered_surface(image: Image, view: View, stack: ExitStack, context: Context) -> Image:
     """Return a surface model as a radar image from a view: a file until the stack is closed."""
-    model = RasterModel(image.source, image.band)
+    model = RasterModel(image.source, image.band or 1)
     ground = SurfaceGround(Scene.of(image.source, image.band), model, (view,))
     path = stack.enter_context(scratch_folder()) / "image.tif"
     write_image(ground, view, path, context.progress)

@@ -39,7 +39,7 @@ class Report(Page):
             "correction": None if correction is None else correction.summary(),
             "transform": None if transform is None else transform.to_json(),
             "mask": found.mask.summary(),
-            "scene": found.scene.facts(),
+            "scene": found.scene.summary(),
             **({} if survey is None else {"parts": parts.summary(survey)}),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
             **({"tried": list(found.tried)} if found.tried else {}),
