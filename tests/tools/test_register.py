@@ -137,3 +137,33 @@ def test_what_matches_at_two_places_is_not_tried_in_another_way(
     with pytest.raises(NotRegisteredError, match="two places match about as well"):
         groundtie.register(*paths)
     assert tried == ["second place"]
+
+
+def test_what_the_images_are_is_asked_as_far_as_each_way_searches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mask of the ground is made of what a radar image shows there, and nothing beyond."""
+    searched = []
+
+    def run(*arguments: Any) -> Registration:
+        found = automatic_run(*arguments)
+        grid = found.scene.reference.scene.grid
+        assert grid == found.scene.input.scene.grid == found.pair.surroundings
+        searched.append((grid.width, found.scene))
+        return found
+
+    automatic_run = automatic.run
+    monkeypatch.setattr(automatic, "run", run)
+    # Of another place each; the input is in the middle of the reference.
+    paths = []
+    for seed, (name, first, side) in enumerate(
+        (("reference.tif", 0, 700), ("input.tif", 250, 200))
+    ):
+        image = np.clip(120 + 30 * texture(side, side, seed=seed), 1, 255).astype(np.float32)
+        place = utm_grid(700, 700, 1.0).window(first, first, side, side)
+        paths.append(write_raster(tmp_path / name, image, place))
+    with pytest.raises(NotRegisteredError):
+        groundtie.register(*paths)
+    widths, scenes = zip(*searched, strict=True)
+    assert widths[-1] > widths[0]
+    assert scenes[0] is scenes[1]

@@ -158,7 +158,9 @@ def _first_accepted(
         for number, way in enumerate(ways, start=1):
             part = context.part((number - 1) / len(ways), number / len(ways))
             spec = replace(way.spec, **asked, tries=tries + 1)
-            found.append(run(call.with_limits(opened, spec, part), spec, part, scene))
+            images = call.with_limits(opened, spec, part)
+            is_same = images.pair.surroundings == opened.pair.surroundings
+            found.append(run(images, spec, part, scene if is_same else None))
             verdict, tries = found[-1].verdict, found[-1].spec.tries
             word = "accepted" if verdict.accepted else f"refused ({verdict.reason})"
             tried.append(f"{way.name}, as {way.because}: {word}")
