@@ -59,7 +59,7 @@ class Stages:
     held_out
         What only check chips may see.
     matcher
-        Matches chips of the fit, check chips and, on reduced images, the coarse shift.
+        Matches chips of a fit to surfaces, check chips and, on reduced images, the coarse shift.
     fit
         Fits the model.
     """

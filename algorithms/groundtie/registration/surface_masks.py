@@ -126,7 +126,7 @@ def rendered_surface(image: Image, view: View, stack: ExitStack, context: Contex
 
 @dataclass(frozen=True)
 class ModelFit:
-    """How well a surface model fits what the reference shows.
+    """How well a surface model fits what an image shows.
 
     Parameters
     ----------

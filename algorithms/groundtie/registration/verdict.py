@@ -19,6 +19,8 @@ from .rules import RULES, Rule
 class Verdict:
     """Whether a registration can be trusted.
 
+    Of refined RPCs, pixels are the image's, and the overlap is the image.
+
     Parameters
     ----------
     accepted

@@ -1,7 +1,7 @@
 """The one list of rules by which registrations are refused.
 
 A rule looks at evidence and returns why it refuses, in a sentence, or None. Its stage is the kind
-of evidence that it reads (see `evidence`); `verdict.judge` asks all rules of the evidence's stages
+of evidence that it reads (see `evidence`); `verdict.refusals` asks all rules of the evidence's stages
 in their order, and the first one that refuses decides. What may be tried after that, `is_final`
 states.
 

@@ -68,7 +68,7 @@ POSE_RULES: tuple[Rule, ...] = (
         f"finds another pose, whose corners are more than {SAME_SHARE:.0%} of the reference's "
         "longer side away",
         "suite rotated_pairs",
-        "take the exhaustive search",
+        "allow larger rotations and shifts",
         _not_exhaustive,
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...masks.used import GROUND, SURFACE
+from ...masks.used import GROUND
 from ..evidence import RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
@@ -33,7 +33,7 @@ def _few_on_ground(evidence: RegistrationEvidence) -> str | None:
 
 
 def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    if evidence.mask.kind == SURFACE and not evidence.mask.is_reliable:
+    if not evidence.mask.is_reliable:
         return "the reference does not show the elevated objects of the surface model"
     fit = evidence.input_fit
     if fit is None:
