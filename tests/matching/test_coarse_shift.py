@@ -30,8 +30,10 @@ from groundtie.similarity.surface import SimilaritySettings
 SETTINGS = SimilaritySettings("orientation")
 
 
-def nothing_held_out(piece: Grid) -> np.ndarray:
-    return np.zeros((piece.height, piece.width), bool)
+def candidates(
+    pair: ImagePair, level: Grid, limits: SearchLimits, context: Context
+) -> list[Candidate]:
+    return coarse_candidates(replace(pair, limits=limits), level, SETTINGS, None, context)
 
 
 def shift_m(candidate: Candidate) -> tuple[float, ...]:
@@ -45,9 +47,7 @@ def test_levels_are_no_larger_than_512_pixels() -> None:
 
 
 def test_the_best_candidate_is_the_shift(pair: ImagePair, context: Context) -> None:
-    found = coarse_candidates(
-        pair, pair.grid, SearchLimits(140.0), SETTINGS, nothing_held_out, context
-    )
+    found = candidates(pair, pair.grid, SearchLimits(140.0), context)
     assert shift_m(found[0]) == pytest.approx((70, -45), abs=2)
     assert [c.height for c in found] == sorted((c.height for c in found), reverse=True)
     places = np.array([shift_m(c) for c in found])
@@ -58,7 +58,7 @@ def test_the_best_candidate_is_the_shift(pair: ImagePair, context: Context) -> N
 
 def test_candidates_on_a_coarser_level_are_in_map_units(pair: ImagePair, context: Context) -> None:
     level = pair.grid.scaled(2)
-    found = coarse_candidates(pair, level, SearchLimits(140.0), SETTINGS, nothing_held_out, context)
+    found = candidates(pair, level, SearchLimits(140.0), context)
     assert shift_m(found[0]) == pytest.approx((70, -45), abs=6)
 
 
@@ -71,7 +71,7 @@ def test_low_candidates_of_any_search_are_left_out(
 
     monkeypatch.setattr(coarse_shift, "find_poses", poses)
     limits = SearchLimits(140.0, 10.0)
-    found = coarse_candidates(pair, pair.grid, limits, SETTINGS, nothing_held_out, context)
+    found = candidates(pair, pair.grid, limits, context)
     assert [candidate.height for candidate in found] == [10.0, 4.1]
 
 
@@ -85,7 +85,7 @@ def test_what_repeats_matches_a_period_off_at_the_same_rotation(
     limits = SearchLimits(1.2 * period_m, 5.0)
     with open_raster(one) as reference, open_raster(other) as input:
         pair = make_pair(Image(reference), Image(input), None, limits.radius, 5.0)
-        found = coarse_candidates(pair, pair.grid, limits, SETTINGS, nothing_held_out, context)
+        found = candidates(pair, pair.grid, limits, context)
     high = [one for one in found if one.height > 0.8 * found[0].height]
     centre = pair.grid.pixel_to_map([pair.grid.centre_px])
     moved_m = [np.hypot(*(one.model(centre) - centre)[0]) for one in high]
@@ -105,9 +105,7 @@ def test_images_without_content_are_named(
     with open_raster(paths["reference"]) as reference, open_raster(paths["input"]) as input:
         pair = make_pair(Image(reference), Image(input))
         with pytest.raises(RasterContentError, match=rf"empty\.tif.*{text}"):
-            coarse_candidates(
-                pair, pair.grid, SearchLimits(40.0), SETTINGS, nothing_held_out, context
-            )
+            candidates(pair, pair.grid, SearchLimits(40.0), context)
 
 
 @pytest.mark.parametrize("which", ["reference", "input"])
@@ -150,9 +148,7 @@ def test_a_mask_is_named_for_what_it_hides_and_nothing_else(
         images[which] = replace(images[which], mask=stack.enter_context(open_raster(mask)))
         pair = make_pair(images["reference"], images["input"])
         with pytest.raises(RasterContentError) as error:
-            coarse_candidates(
-                pair, pair.grid, SearchLimits(40.0), SETTINGS, nothing_held_out, context
-            )
+            candidates(pair, pair.grid, SearchLimits(40.0), context)
     assert str(error.value).startswith(text.format(image))
 
 

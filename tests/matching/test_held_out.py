@@ -28,10 +28,11 @@ from groundtie.similarity.surface import SimilaritySettings
 
 
 def registered(files: TexturedPair, kind: str, similarity: str) -> tuple[Estimate, TiePoints]:
-    with files.opened() as pair, threads(2) as context:
+    with files.opened() as opened, threads(2) as context:
+        pair = replace(opened, limits=SearchLimits(200.0))
         held_out = HeldOut.of(pair)
         matcher = ChipMatcher(pair, SimilaritySettings(similarity), held_out)
-        coarse = find_coarse_model(matcher, held_out, SearchLimits(200.0), context)
+        coarse = find_coarse_model(matcher, context)
         estimate = SurfaceFit(matcher, held_out.layout).estimate(coarse, kind, context)
         model = estimate.transform.model
         return estimate, check_model(matcher, held_out.layout, model, context).points

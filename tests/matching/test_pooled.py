@@ -62,7 +62,7 @@ def matcher_of(pair: ImagePair) -> PooledHistogramMatcher:
 
 
 def coarse_model(pair: ImagePair, context: Context) -> Model:
-    return find_coarse_model(matcher_of(pair), HeldOut.of(pair), LIMITS, context)
+    return find_coarse_model(matcher_of(replace(pair, limits=LIMITS)), context)
 
 
 def estimate_of(pair: ImagePair, coarse: Model, context: Context) -> Estimate:

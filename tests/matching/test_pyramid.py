@@ -27,9 +27,9 @@ from groundtie.similarity.surface import SimilaritySettings
 
 
 def coarse_model(pair: ImagePair, radius_m: float, context: Context) -> Model:
-    held_out = HeldOut.of(pair)
-    matcher = ChipMatcher(pair, SimilaritySettings("orientation"), held_out)
-    return find_coarse_model(matcher, held_out, SearchLimits(radius_m), context)
+    pair = replace(pair, limits=SearchLimits(radius_m))
+    matcher = ChipMatcher(pair, SimilaritySettings("orientation"), HeldOut.of(pair))
+    return find_coarse_model(matcher, context)
 
 
 def error_m(model: Model, files: TexturedPair) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,10 +37,10 @@ def coarse_shift_px(folder: Path, values: np.ndarray, radius_m: float) -> np.nda
         open_raster(second) as other,
         threads(2) as context,
     ):
-        pair = make_pair(Image(one), Image(other))
+        pair = replace(make_pair(Image(one), Image(other)), limits=SearchLimits(radius_m))
         held_out = HeldOut.of(pair)
         matcher = ChipMatcher(pair, SimilaritySettings("orientation"), held_out)
-        model = find_coarse_model(matcher, held_out, SearchLimits(radius_m), context)
+        model = find_coarse_model(matcher, context)
         centre = grid.pixel_to_map([grid.centre_px])
         return (grid.map_to_pixel(model(centre)) - [grid.centre_px])[0]
 

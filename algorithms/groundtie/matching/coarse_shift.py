@@ -8,7 +8,6 @@ import numpy as np
 
 from ..context import Context
 from ..geometry.fitting import fit_model
-from ..geometry.limits import SearchLimits
 from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
@@ -54,12 +53,11 @@ def level_factor(grid: Grid) -> float:
 def coarse_candidates(
     pair: ImagePair,
     level: Grid,
-    limits: SearchLimits,
     settings: SimilaritySettings,
-    held_out: MaskOf,
+    held_out: MaskOf | None,
     context: Context,
 ) -> list[Candidate]:
-    """Return the best shifts or poses, best first, within the limits of a search.
+    """Return the best shifts or poses, best first, within the limits of a pair.
 
     Parameters
     ----------
@@ -67,12 +65,11 @@ def coarse_candidates(
         The images.
     level
         The matching grid at reduced resolution.
-    limits
-        How far the input may lie from its nominal place, in metres.
     settings
         How similarity is measured.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen.
+        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
+        may be.
     context
         Threads.
 
@@ -83,9 +80,10 @@ def coarse_candidates(
     """
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
+    limits = pair.limits
     if limits.is_shift:
         nominal = shift_model(0.0, 0.0)
-        places = _places(pair, level, limits.radius, settings, held_out, context, nominal)
+        places = _places(pair, level, settings, held_out, context, nominal)
         return [Candidate(_shift_on_map(place, level), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
@@ -94,7 +92,7 @@ def coarse_candidates(
     poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
     if not poses:
         return []
-    places = _places(pair, level, limits.radius, settings, held_out, context, poses[0].model)
+    places = _places(pair, level, settings, held_out, context, poses[0].model)
     poses += _elsewhere(poses[0], places, level)
     return sorted(poses, key=lambda one: one.height, reverse=True)
 
@@ -130,15 +128,14 @@ def _elsewhere(pose: Candidate, places: list[Peak], level: Grid) -> list[Candida
 def _places(
     pair: ImagePair,
     level: Grid,
-    radius_m: float,
     settings: SimilaritySettings,
-    held_out: MaskOf,
+    held_out: MaskOf | None,
     context: Context,
     model: Model,
 ) -> list[Peak]:
     """Search all shifts from a model on, and return the highest peaks of their similarity."""
     # The true place may lie a pixel of the level further than whole pixels show.
-    radius_px = int(np.ceil(radius_m / min(level.pixel_sides_m))) + 1
+    radius_px = int(np.ceil(pair.limits.radius / min(level.pixel_sides_m))) + 1
     # Farther off too little of the images overlaps.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
     reach = radius_px + BORDER_PX
@@ -165,14 +162,19 @@ def _places(
 
 
 def _patches(
-    pair: ImagePair, level: Grid, model: Model, reach: int, held_out: MaskOf, context: Context
+    pair: ImagePair,
+    level: Grid,
+    model: Model,
+    reach: int,
+    held_out: MaskOf | None,
+    context: Context,
 ) -> tuple[Patch, Patch]:
     """Return the reference with a border around the level, and the input with a wider one."""
     template, search = (
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
         for more in (BORDER_PX, reach)
     )
-    hidden = held_out(template)
+    hidden = None if held_out is None else held_out(template)
 
     def of_reference(image: Image) -> Patch:
         return replace(pair, reference=image).reference_patch(template, hidden)

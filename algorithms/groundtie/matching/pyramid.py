@@ -9,14 +9,12 @@ import numpy as np
 from ..context import Context
 from ..errors import AmbiguousPlaceError, NothingFoundError
 from ..geometry.judging import RIVAL_HEIGHT
-from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.held_images import held_on_level
 from .chips import ChipMatcher
 from .coarse_shift import Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
-from .matcher import MaskOf
 from .pooled import PooledHistogramMatcher
 from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
 
@@ -46,22 +44,14 @@ _STEP = 4.0
 _POOLED_STEP = 2.0
 
 
-def find_coarse_model(
-    matcher: SurfaceMatcher,
-    held_out: MaskOf,
-    limits: SearchLimits,
-    context: Context,
-) -> Model:
+def find_coarse_model(matcher: SurfaceMatcher, context: Context) -> Model:
     """Return a model of degree 1 on the map, from which tie points can be searched for.
 
     Parameters
     ----------
     matcher
-        What tie points are matched by; it sees nothing of what is held out.
-    held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen.
-    limits
-        How far the input may lie from its nominal place, in metres.
+        What tie points are matched by; it sees nothing of what is held out. Its pair holds how far
+        the input may lie from its nominal place.
     context
         Threads and progress.
 
@@ -72,13 +62,12 @@ def find_coarse_model(
     AmbiguousPlaceError
         Another place matches about as well.
     """
-    grid = matcher.pair.grid
-    factor = level_factor(grid)
-    level = grid.scaled(factor)
     pair = matcher.pair
-    if limits.is_shift:  # others look at larger and smaller pixels, too
+    factor = level_factor(pair.grid)
+    level = pair.grid.scaled(factor)
+    if pair.limits.is_shift:  # others look at larger and smaller pixels, too
         pair = held_on_level(pair, level, context.quiet())
-    candidates = coarse_candidates(pair, level, limits, matcher.settings, held_out, context)
+    candidates = coarse_candidates(pair, level, matcher.settings, matcher.held_out, context)
     context.update(0.3)
     if isinstance(matcher, PooledHistogramMatcher):
         return _descend_pooled(matcher, candidates, factor, context)

@@ -114,8 +114,7 @@ class Stages:
         """Return the coarse model; that of images which are placed is none at all."""
         if self.spec.is_placed:
             return shift_model(0.0, 0.0)
-        limits = self.masked.pair.limits
-        return find_coarse_model(self.matcher, self.held_out, limits, context)
+        return find_coarse_model(self.matcher, context)
 
     def check(self, model: Model, context: Context) -> Check:
         """Match the check chips around what a model on the map predicts."""

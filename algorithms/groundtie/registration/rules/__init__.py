@@ -1,9 +1,9 @@
 """The one list of rules by which registrations are refused.
 
 A rule looks at evidence and returns why it refuses, in a sentence, or None. Its stage is the kind
-of evidence that it reads (see `evidence`); `verdict.refusals` asks all rules of the evidence's stages
-in their order, and the first one that refuses decides. What may be tried after that, `is_final`
-states.
+of evidence that it reads (see `evidence`); `verdict.refusals` asks all rules of the evidence's
+stages in their order, and the first one that refuses decides. What may be tried after that,
+`is_final` states.
 
 Each stage has a module here, with its limits and their sources. To add a rule, write a function
 and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a
