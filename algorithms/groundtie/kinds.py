@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import reprlib
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -334,7 +335,9 @@ def _in_memory(name: str, value: Any) -> Any:
     except GroundTieError as error:
         raise ParameterError(f"{name}: {error}") from error
     if held is None:
-        raise ParameterError(f"{name} must be a path, an open dataset or an array, not {value!r}")
+        raise ParameterError(
+            f"{name} must be a path, an open dataset or an array, not {reprlib.repr(value)}"
+        )
     return held
 
 

@@ -59,7 +59,8 @@ def budget_bytes() -> int:
         megabytes = float("nan")
     if not LEAST_MB <= megabytes <= MOST_MB:
         raise ParameterError(
-            f"memory must be {LEAST_MB} to {MOST_MB} megabytes, not {text!r} ({VARIABLE})"
+            f"the memory (--memory or {VARIABLE}) must be {LEAST_MB} to {MOST_MB} megabytes, "
+            f"not {text!r}"
         )
     return round(megabytes * 1e6)
 

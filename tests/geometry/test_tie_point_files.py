@@ -226,7 +226,7 @@ def test_numbers_as_only_python_writes_them_are_refused(
     row[column] = number
     path = tmp_path / "mine.csv"
     path.write_text(f"{TABLE},score\n{','.join(row)}\n", encoding="utf-8")
-    with pytest.raises(TransformFileError, match=f"'{number}' is no number"):
+    with pytest.raises(TransformFileError, match=f"in row 1 is '{number}', and must be a number"):
         read_tie_points(path, PLAIN)
 
 

@@ -12,7 +12,13 @@ from rasterio.crs import CRS
 from rasterio.enums import ColorInterp
 from scipy.ndimage import binary_erosion
 
-from groundtie.errors import BandError, GeoreferencingError, NoOverlapError, SameFileError
+from groundtie.errors import (
+    BandError,
+    GeoreferencingError,
+    NoOverlapError,
+    ParameterError,
+    SameFileError,
+)
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
 from groundtie.rasters.pair import Image, ImagePair, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
@@ -177,9 +183,14 @@ def test_a_pixel_size_that_is_asked_for(files: Files) -> None:
     assert pair.grid.pixel_size_m == pytest.approx(25)
     assert (pair.grid.width, pair.grid.height) == (48, 40)
     assert pair.overlap_px == (48, 40)
-    finer = make_pair(files.image(), files.image(), matching_pixel_size_m=5.0)
-    assert finer.overlap_px == (240, 200)
-    assert_both_show_the_same(finer, 0.9, 1.0)
+
+
+def test_a_pixel_size_between_those_of_both_images(files: Files) -> None:
+    fine, coarse = files.image(), files.image(covering(UTM, 20.0))
+    pair = make_pair(fine, coarse, matching_pixel_size_m=10.0)
+    assert pair.overlap_px == (120, 100)
+    with pytest.raises(ParameterError, match=r"of 9 is finer than both images' \(10\)"):
+        make_pair(fine, coarse, matching_pixel_size_m=9.0)
 
 
 @pytest.mark.parametrize(

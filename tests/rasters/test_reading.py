@@ -253,10 +253,12 @@ RPCS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["RPCs", "ground control points"])
+@pytest.mark.parametrize(
+    ("kind", "remedy"), [("RPCs", "orthorectify"), ("ground control points", "gdalwarp -tps")]
+)
 @pytest.mark.parametrize("stated", [{}, {"crs": "EPSG:4326"}])
 def test_sensor_geometry_needs_orthorectification(
-    tmp_path: Path, kind: str, stated: dict[str, Any]
+    tmp_path: Path, kind: str, remedy: str, stated: dict[str, Any]
 ) -> None:
     path = write_raster(tmp_path / "raw.tif", IMAGE, **stated)
     with rasterio.open(path, "r+") as dataset:
@@ -265,7 +267,7 @@ def test_sensor_geometry_needs_orthorectification(
         else:
             corners = [(0, 0, 5e5, 5e6), (0, 60, 5.1e5, 5e6), (40, 0, 5e5, 4.9e6)]
             dataset.gcps = ([GroundControlPoint(*corner) for corner in corners], UTM)
-    with pytest.raises(GeoreferencingError, match=f"raw.tif is located by {kind}.*orthorectify"):
+    with pytest.raises(GeoreferencingError, match=f"raw.tif is located by {kind} only; .*{remedy}"):
         open_raster(path)
     source = open_raster(path, allow_sensor_geometry=True)
     assert source.grid.transform == PIXEL_COORDINATES

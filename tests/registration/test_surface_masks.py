@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,7 +15,7 @@ from affine import Affine
 from contexts import context
 
 from groundtie.context import Context
-from groundtie.errors import NoOverlapError, ParameterError
+from groundtie.errors import NoOverlapError, ParameterError, RasterOpenError
 from groundtie.geometry.views import View
 from groundtie.masks.scene import Scene
 from groundtie.masks.used import REFERENCE, SURFACE
@@ -190,8 +191,11 @@ def test_a_model_needs_both_views_and_a_view_a_model(city: Path, tmp_path: Path)
     }
     found = asked_surface(given, "input")
     assert found == stated(city)
-    with pytest.raises(ParameterError, match="needs the view of the input"):
-        asked_surface({**given, "input": tmp_path / "alone.tif"}, "input")
+    alone = shutil.copy(city / "input.tif", tmp_path / "alone.tif")
+    with pytest.raises(ParameterError, match="view of the input is not known"):
+        asked_surface({**given, "input": alone}, "input")
+    with pytest.raises(RasterOpenError, match=r"cannot read .*nowhere\.tif"):
+        asked_surface({**given, "input": tmp_path / "nowhere.tif"}, "input")
     with pytest.raises(ParameterError, match="go with a surface model"):
         view = "radar azimuth=90 incidence=40"
         asked_surface({**given, "surface_model": None, "views": view}, "input")

@@ -118,8 +118,8 @@ def test_the_json_is_the_summary(variants: list[Variant]) -> None:
     for variant in variants:
         assert variant.numbers == {"format": REPORT_FORMAT, **variant.report.summary()}
         assert list(variant.numbers) == [
-            *("format", "verdict", "correction", "transform", "mask", "scene"),
-            *("parameters", "versions", "seconds"),
+            *("format", "verdict", "correction", "transform", "mask"),
+            *("notes", "scene", "parameters", "versions", "seconds"),
         ]
         assert variant.numbers["verdict"] == variant.report.registration.verdict.summary()
 

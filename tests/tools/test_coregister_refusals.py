@@ -145,7 +145,7 @@ BAD_IMAGES: dict[str, tuple[Any, type[GroundTieError], str]] = {
     "all nodata": (all_nodata, RasterContentError, "no valid pixel"),
     "all NaN": (all_nan, RasterContentError, "no valid pixel"),
     "all infinite": (infinite, RasterContentError, "no valid pixel"),
-    "too small": (lambda v: v[:60, :60], NoOverlapError, "too little"),
+    "too small": (lambda v: v[:60, :60], NoOverlapError, "144 × 144 are needed"),
 }
 
 

@@ -51,10 +51,20 @@ def columns(rows: list[Row], x: str, y: str) -> FloatArray:
 
 def numbers(rows: list[Row], name: str) -> FloatArray:
     """Return a column of numbers, shape (n,); NaN where a row has none."""
-    values = [row.get(name) for row in rows]
-    return np.array(
-        [np.nan if value in (None, "") else plain_number(value) for value in values], float
-    )
+    found = np.full(len(rows), np.nan)
+    for place, row in enumerate(rows):
+        if row.get(name) not in (None, ""):
+            found[place] = _number(row, name, place + 1)
+    return found
+
+
+def _number(row: Row, name: str, number: int) -> float:
+    """Return the number in a column of the row of a number, from 1."""
+    try:
+        return plain_number(row[name])
+    except (TypeError, ValueError) as error:
+        shown = "empty" if row[name] in (None, "") else f"{row[name]!r:.40}"
+        raise ValueError(f"{name} in row {number} is {shown}, and must be a number") from error
 
 
 def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
@@ -62,11 +72,16 @@ def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
 
     Raises
     ------
-    KeyError, TypeError, ValueError
+    KeyError, ValueError
         A row has none.
     """
-    places = [[plain_number(row[x]), plain_number(row[y])] for row in rows]
+    places = [position(row, x, y, number) for number, row in enumerate(rows, 1)]
     return np.array(places, float).reshape(-1, 2)
+
+
+def position(row: Row, x: str, y: str, number: int) -> tuple[float, float]:
+    """Return the position in two columns of the row of a number, from 1; raises as `positions`."""
+    return _number(row, x, number), _number(row, y, number)
 
 
 def require_places(places: FloatArray) -> FloatArray:

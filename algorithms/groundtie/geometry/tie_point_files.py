@@ -32,6 +32,7 @@ from .point_tables import (
     Row,
     columns,
     numbers,
+    position,
     positions,
     require_places,
     table_rows,
@@ -257,6 +258,6 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     if INPUT[0] in names:
         on_map = input_grid.map_to_pixel(columns(rows, *INPUT))
         px = np.where(np.isfinite(px), px, on_map)
-    missing = [row for row, known in zip(rows, np.isfinite(px).all(1), strict=True) if not known]
-    px[~np.isfinite(px).all(1)] = positions(missing, *PIXEL)
+    for place in np.flatnonzero(~np.isfinite(px).all(axis=1)):
+        px[place] = position(rows[place], *PIXEL, int(place) + 1)
     return px

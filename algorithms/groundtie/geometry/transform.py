@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -161,6 +162,8 @@ class Transform:
             The values do not describe a transform.
         """
         try:
+            if not isinstance(values, Mapping):
+                raise TransformFileError("not a transform: no object of names and values")
             if values["format"] != FORMAT:
                 raise TransformFileError(f"not a {FORMAT} file but {values['format']!r:.60}")
             grid, crs = Grid.from_json(values["input"]), crs_from_text(values["crs"])
@@ -168,7 +171,8 @@ class Transform:
         except (KeyError, TypeError, ValueError, CRSError, OverflowError) as error:
             if isinstance(error, TransformFileError):
                 raise
-            raise TransformFileError(f"not a transform: {error!r}") from error
+            reason = f"{error} is missing" if isinstance(error, KeyError) else error
+            raise TransformFileError(f"not a transform: {reason}") from error
 
 
 def as_positions(values: ArrayLike) -> FloatArray:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
+from ..rasters.reading import open_raster
 from ..strict_json import read_json
 from .product_views import CAMERA, RADAR, metadata_beside, read_product_view
 
@@ -94,6 +95,21 @@ class View:
             return read_view(beside)
         of_product = map(_product_view, metadata_beside(Path(image)))
         return next((view for view in of_product if view is not None), None)
+
+
+def no_view(image: Any, name: str) -> ParameterError:
+    """Return the error that the view of an image is not known.
+
+    Raises
+    ------
+    RasterOpenError
+        The image is not there at all.
+    """
+    with open_raster(image, allow_sensor_geometry=True):
+        return ParameterError(
+            f"the view of the {name} is not known: put its STAC item or its product's metadata "
+            "beside it, or give views"
+        )
 
 
 def split_views(words: str | None) -> tuple[str | None, str | None]:

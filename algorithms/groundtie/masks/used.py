@@ -1,4 +1,4 @@
-"""Which mask a registration used."""
+"""Which mask of the ground a registration used."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REFERENCE, INPUT = "reference", "input"
 
 @dataclass(frozen=True)
 class MaskUsed:
-    """The mask that was used.
+    """The mask of the ground that was used; what users mask besides is noted at their images.
 
     Parameters
     ----------
@@ -69,5 +69,6 @@ class MaskUsed:
     def line(self) -> str:
         """Return the mask as a line of text."""
         if self.image is None:
-            return f"mask: {self.kind}, {self.reason}"
-        return f"mask: {self.kind}, {self.share:.0%} of the {self.image} take part; {self.reason}"
+            return f"mask of the ground: {self.kind}, {self.reason}"
+        share = f"{self.share:.0%} of the {self.image} take part"
+        return f"mask of the ground: {self.kind}, {share}; {self.reason}"

@@ -83,7 +83,7 @@ class KeypointFit:
         ------
         TooFewPointsError
             Too few matches agree on a model.
-        AmbiguousPlaceError
+        NothingFoundError
             Many of them agree on two.
         """
         # A spline is fitted last, to what agrees with a polynomial.

@@ -175,10 +175,8 @@ def grid_of(name: str, dataset: Any, *, allow_sensor_geometry: bool) -> Grid:
 def _refuse_sensor_geometry(name: str, dataset: Any) -> None:
     located_by = ""
     if stated(lambda: dataset.tags(ns="RPC")):
-        located_by = "RPCs"
+        located_by, remedy = "RPCs", "orthorectify it first (tool orthorectify)"
     elif stated(lambda: dataset.gcps)[0]:
-        located_by = "ground control points"
+        located_by, remedy = "ground control points", "warp it by them first (gdalwarp -tps)"
     if located_by:
-        raise GeoreferencingError(
-            f"{name} is located by {located_by} only; orthorectify it first (gdalwarp -rpc or -tps)"
-        )
+        raise GeoreferencingError(f"{name} is located by {located_by} only; {remedy}")

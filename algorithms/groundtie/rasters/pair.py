@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import GeoreferencingError, NoOverlapError, RasterContentError, SameFileError
+from ..errors import (
+    GeoreferencingError,
+    NoOverlapError,
+    ParameterError,
+    RasterContentError,
+    SameFileError,
+)
 from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..geometry.transform import Transform
@@ -233,7 +239,7 @@ def make_pair(
     reference, input
         The two images.
     matching_pixel_size_m
-        Pixel size of the matching grid; None: that of the coarser image.
+        Pixel size of the matching grid, no less than the finer image's; None: the coarser one's.
     search_radius_m
         How far the input may lie from its nominal place; None: as `default_radius_m`.
     rotation_deg, scale
@@ -245,6 +251,8 @@ def make_pair(
     ------
     SameFileError
         Both are the same raster.
+    ParameterError
+        The pixel size is smaller than that of both images, which show nothing more.
     GeoreferencingError
         Only one of them is georeferenced.
     NoOverlapError
@@ -255,6 +263,11 @@ def make_pair(
         raise SameFileError(f"reference and input are the same raster: {ref.path}")
     require_georeferenced_alike(ref, inp)
     wanted = matching_pixel_size_m or coarser_m(ref.grid, inp.grid)
+    finest = min(grid.pixel_size_m for grid in (ref.grid, inp.grid))
+    if wanted < finest * (1 - _SAME_SIZE):
+        raise ParameterError(
+            f"a pixel size for matching of {wanted:g} is finer than both images' ({finest:g})"
+        )
     factor = wanted / ref.grid.pixel_size_m
     grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import ParameterError
-from ..geometry.views import RADAR, View, parse_view, split_views
+from ..geometry.views import RADAR, View, no_view, parse_view, split_views
 from ..kinds import AUTO
 from ..masks.used import NONE
 from ..rasters.rendered import LIGHTS, SUN, Light
@@ -80,10 +80,7 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
     views = [View.of(given[name], word) for name, word in zip(names, words, strict=True)]
     for name, view in zip(names, views, strict=True):
         if view is None:
-            raise ParameterError(
-                f"a surface model needs the view of the {name}: put its STAC item beside it, or "
-                "give views"
-            )
+            raise no_view(given[name], name)
     reference, other = (view for view in views if view is not None)
     return StatedSurface(model, (reference, other))
 

@@ -61,7 +61,7 @@ _RESAMPLING = Choice(help="How pixels are interpolated.", choices=METHODS)
 _WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=MOST_WORKERS)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Registration:
     """A judged registration.
 
@@ -299,11 +299,17 @@ class Registration:
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
             ]
+            lines += self.pair.notes()
             if self.mask.image is not None:
                 lines.append(self.mask.line())
             if self.beyond is not None:
                 lines.append(self.beyond.line())
         return lines + file_lines(self.files)
+
+    def __repr__(self) -> str:
+        # Not of all fields, which hold arrays and open rasters.
+        word = "accepted" if self.verdict.accepted else "refused"
+        return f"<{type(self).__name__} {word}: {self.verdict.reason}>"
 
     def close(self) -> None:
         """Close the rasters; what was computed stays."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -92,11 +93,6 @@ class ImageFacts:
     def has_speckle(self) -> bool:
         """Whether it varies in its most homogeneous windows as a radar image does."""
         return self.variation2 >= LEAST_VARIATION2
-
-    @property
-    def looks(self) -> float:
-        """Equivalent number of looks, if it is a radar image: that of fully developed speckle."""
-        return 1 / max(self.variation2, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -240,7 +236,8 @@ class SceneInfo:
         facts = {"radar image": self.radar_name}
         radar = vars(self.radar)
         if "variation2" in radar:
-            facts["equivalent number of looks"] = f"{self.radar.looks:.1f}"
+            found = math.sqrt(radar["variation2"])
+            facts["coefficient of variation"] = f"{found:.2f} in the most homogeneous windows"
         if "strong_share" in radar:
             facts["strong scatterers"] = f"{self.radar.strong_share:.0%} of the radar image"
         return facts

@@ -160,7 +160,9 @@ def with_user_masks(
         mask = given if isinstance(given, UserMask) else UserMask(given)
         if mask.is_zeros:
             raster = stack.enter_context(open_raster(mask.mask))
-            pair = replace(pair, **{name: getattr(pair, name).masked(raster, pair.grid)})
+            image: Any = getattr(pair, name).masked(raster, pair.grid)
+            image = replace(image, mask_note=f"{mask.name} masks the {name}: its zeros")
+            pair = replace(pair, **{name: image})
             continue
         scene = scene_of(pair, name)
         if mask.is_layer or mask.values is not None:
@@ -170,7 +172,7 @@ def with_user_masks(
         pair, share = with_mask(pair, name, scene, select, stack, context)
         if mask.is_layer and mask.values is None:
             used = MaskUsed(LAYER, name, share, f"what {mask.name} covers")
-        image: Any = mask.noted(getattr(pair, name), share, f"the {name}")
+        image = mask.noted(getattr(pair, name), share, f"the {name}")
         pair = replace(pair, **{name: image})
         context.update(1.0, image.mask_note)
     return pair, used

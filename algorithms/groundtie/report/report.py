@@ -39,6 +39,7 @@ class Report(Page):
             "correction": None if correction is None else correction.summary(),
             "transform": None if transform is None else transform.to_json(),
             "mask": found.mask.summary(),
+            "notes": found.pair.notes(),
             "scene": found.scene.summary(),
             **({} if survey is None else {"parts": parts.summary(survey)}),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..declaration import Output, given_files, tool
-from ..errors import ParameterError
-from ..geometry.views import View, split_views, stated_view
+from ..geometry.views import View, no_view, split_views, stated_view
 from ..kinds import RasterOut
 from ..masks.scene import Scene, write_mask, write_tiles
 from ..progress import SILENT, Progress
@@ -53,9 +52,7 @@ def mask_surface(
     own, other = split_views(views)
     view = View.of(reference, own)
     if view is None:
-        raise ParameterError(
-            "the view of the reference is not known: put its STAC item beside it, or give views"
-        )
+        raise no_view(reference, "reference")
     known = (view,) if other is None else (view, stated_view(other))
     files = given_files({"mask": output, "reasons": reasons})
     with ExitStack() as stack:

@@ -20,8 +20,7 @@ def _ended_with(kind: type[GroundTieError]) -> Callable[[SearchEvidence], str | 
 SEARCH_RULES: tuple[Rule, ...] = (
     Rule(
         "second place",
-        "a second place matches about as well as the best: half of its evidence (log10), or "
-        "keypoints that agree on a second transform",
+        "a second place matches about as well as the best: half of its evidence (log10)",
         "suite crossings and repetitive scenes",
         "give a larger part of the scene, or a matching pixel size that shows more than what "
         "repeats",
@@ -30,9 +29,10 @@ SEARCH_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing in common",
-        "no place matches better than random ones would",
+        "no place matches better than random ones would, or keypoints agree on a second transform, "
+        "as those of ground and of elevated objects",
         "expected false alarms above 1; [Moisan2004]",
-        f"{WIDER} (with coregister, match_sar_sar or match_optical)",
+        f"{WIDER} (of images on maps: with coregister, match_sar_sar or match_optical)",
         _ended_with(NothingFoundError),
     ),
     Rule(
