@@ -204,7 +204,7 @@ class TestResultsInMemory:
         assert found["input"].values is values
         assert found["output"] is None
         assert found["shown"] == {"input": found["input"], "output": None, "factor": 2.0}
-        assert plain(found["shown"])["input"] == "array of 60 × 40"
+        assert plain(found["shown"])["input"] == "array of 60 × 40 (input)"
 
     def test_an_open_dataset_is_handed_on_and_reported_by_its_name(self, tmp_path: Path) -> None:
         path = write_raster(tmp_path / "a.tif", np.zeros((4, 6)), utm_grid(6, 4))
@@ -219,7 +219,7 @@ class TestResultsInMemory:
 
     def test_a_mask_may_be_an_array(self) -> None:
         held = MaskIn(label="Mask", help="It.").check("mask", np.zeros((4, 6), bool))
-        assert str(held) == "array of 6 × 4"
+        assert str(held) == "array of 6 × 4 (mask)"
 
     def test_arrays_of_one_size_are_two_rasters(self, tmp_path: Path) -> None:
         one, other = np.zeros((40, 60)), np.zeros((40, 60))

@@ -48,6 +48,8 @@ class Raster:
         ("EPSG:32632", 32632); None: local coordinates.
     nodata
         Value of pixels that hold no data.
+    called
+        What messages call it besides its size: tools take the parameter's name.
 
     Raises
     ------
@@ -61,6 +63,7 @@ class Raster:
     transform: Affine | None = None
     crs: CRS | None = None
     nodata: float | None = None
+    called: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", _pixels(self.values))
@@ -156,7 +159,8 @@ class Raster:
     @property
     def name(self) -> str:
         """What messages call it."""
-        return f"array of {self.width} × {self.height}"
+        size = f"array of {self.width} × {self.height}"
+        return f"{size} ({self.called})" if self.called else size
 
     @property
     def identity(self) -> Hashable:

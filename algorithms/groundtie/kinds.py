@@ -7,7 +7,7 @@ import math
 import os
 import reprlib
 import stat
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -338,7 +338,8 @@ def _in_memory(name: str, value: Any) -> Any:
         raise ParameterError(
             f"{name} must be a path, an open dataset or an array, not {reprlib.repr(value)}"
         )
-    return held
+    # Of two arrays, messages name the one that they mean.
+    return replace(held, called=name) if hasattr(held, "called") else held
 
 
 def shown_name(value: Any) -> Any:
