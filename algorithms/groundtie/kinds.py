@@ -336,7 +336,7 @@ def _in_memory(name: str, value: Any) -> Any:
         raise ParameterError(f"{name}: {error}") from error
     if held is None:
         raise ParameterError(
-            f"{name} must be a path, an open dataset or an array, not {reprlib.repr(value)}"
+            f"{name} must be a path, an open dataset or an array, not {reprlib.repr(value):.60}"
         )
     # Of two arrays, messages name the one that they mean.
     return replace(held, called=name) if hasattr(held, "called") else held

@@ -154,6 +154,17 @@ def test_the_map_draws_these_arrows_and_its_scale() -> None:
     assert axes.get_position().bounds == (0, 0, 1, 1)
 
 
+@pytest.mark.parametrize("free", range(4))
+def test_the_scale_hides_no_points(free: int) -> None:
+    arrows = figures.residual_arrows(measured(), GRID)
+    width, height = GRID.size
+    corners = np.array([(x, y) for y in (0.93, 0.07) for x in (0.04, 0.96)]) * (width, height)
+    axes = figures.map_axes(GRID)
+    figures.draw_scale(axes, arrows, GRID, np.delete(corners, free, axis=0))
+    (box,) = axes.patches
+    assert [box.get_bbox().contains(*corner) for corner in corners] == [k == free for k in range(4)]
+
+
 def test_the_map_has_the_shape_and_the_limits_of_the_grid() -> None:
     figure = figures.residual_map(measured(), GRID)
     width, height = figure.get_size_inches()

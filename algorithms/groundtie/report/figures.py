@@ -130,7 +130,7 @@ def residual_map(errors: PointErrors, grid: Grid) -> Figure:
         (errors.agreeing, CHECK_COLOUR, 1.0),
     ):
         draw_arrows(axes, errors.position_px[which], arrows.vector_px[which], colour, strength)
-    draw_scale(axes, arrows, grid)
+    draw_scale(axes, arrows, grid, errors.position_px)
     return axes.figure
 
 
@@ -204,7 +204,12 @@ def map_axes(grid: Grid) -> Any:
 
 
 def draw_arrows(
-    axes: Any, start_px: FloatArray, vector_px: FloatArray, colour: str, strength: float = 1.0
+    axes: Any,
+    start_px: FloatArray,
+    vector_px: FloatArray,
+    colour: str,
+    strength: float = 1.0,
+    order: int = 2,
 ) -> None:
     """Draw arrows from positions of the grid, shape (n, 2), along vectors, shape (n, 2)."""
     axes.quiver(
@@ -221,22 +226,32 @@ def draw_arrows(
         minlength=0,
         color=colour,
         alpha=strength,
+        zorder=order,
     )
 
 
-def draw_scale(axes: Any, arrows: Arrows, grid: Grid) -> None:
-    """Draw the arrow that a round residual has, at the lower left."""
+def draw_scale(axes: Any, arrows: Arrows, grid: Grid, shown_px: FloatArray) -> None:
+    """Draw the arrow that a round residual has, in the corner with the fewest points, (n, 2)."""
     from matplotlib.patches import Rectangle
 
     unit = max(grid.size) / 100
     length = arrows.scale_px * arrows.exaggeration
-    left, low = 2 * unit, grid.height - 2 * unit
-    box = Rectangle((left, low), length + 3 * unit, -6 * unit, fc="white", ec="#999999", lw=0.8)
-    axes.add_patch(box)
-    start = np.array([[left + 1.5 * unit, low - 1.5 * unit]])
-    draw_arrows(axes, start, np.array([[length, 0.0]]), "black")
-    text = f"{arrows.scale_px:g} px"
-    axes.text(left + 1.5 * unit + length / 2, low - 3 * unit, text, ha="center", fontsize=10)
+    size = np.array([length + 3 * unit, 6 * unit])
+    corners = np.array(
+        [
+            (x, y)
+            for y in (grid.height - 8 * unit, 2 * unit)
+            for x in (2 * unit, grid.width - 2 * unit - size[0])
+        ]
+    )
+    # A point is drawn as large as a unit or so.
+    beside = np.abs(shown_px - (corners + size / 2)[:, None]) <= size / 2 + unit
+    left, top = corners[beside.all(axis=2).sum(axis=1).argmin()]
+    axes.add_patch(Rectangle((left, top), *size, fc="white", ec="#999999", lw=0.8, zorder=3))
+    start = np.array([[left + 1.5 * unit, top + 4.5 * unit]])
+    draw_arrows(axes, start, np.array([[length, 0.0]]), "black", order=4)
+    middle, text = left + size[0] / 2, f"{arrows.scale_px:g} px"
+    axes.text(middle, top + 3 * unit, text, ha="center", fontsize=10, zorder=4)
 
 
 def without_frame(axes: Any) -> None:

@@ -68,7 +68,7 @@ def parts_map(survey: Survey) -> Figure:
         members, colour = np.array(part.members, int), COLOURS[k % len(COLOURS)]
         axes.plot(*px[members].T, "o", color=colour, ms=8)
         figures.draw_arrows(axes, px[members], arrows.vector_px[members], colour)
-    figures.draw_scale(axes, arrows, grid)
+    figures.draw_scale(axes, arrows, grid, px)
     return axes.figure
 
 
