@@ -13,9 +13,8 @@ from groundtie.geometry.accuracy import (
     UNKNOWN,
     Accuracy,
     Common,
-    predict_accuracy,
+    ErrorModel,
     shared_by_neighbours,
-    standard_deviation_px,
 )
 from groundtie.geometry.estimation import fit_without_blocks
 from groundtie.geometry.fitting import fit_model
@@ -24,7 +23,6 @@ from groundtie.geometry.robust import Mixture
 
 SIZE_PX = 500
 RUNS = 80
-NOTHING = Common()
 NO_BIAS = np.zeros(2)
 
 
@@ -57,7 +55,7 @@ def run(
     matched = CHECK + check_sigma * random.standard_normal(CHECK.shape)
     check = missed(CHECK, matched - model(CHECK))
     place = random.uniform(0, SIZE_PX, (1, 2))
-    found = predict_accuracy(folds, PLACES, check, NOTHING)
+    found = ErrorModel(folds, check).accuracy(PLACES)
     return found, float(np.hypot(*(model(place) - place)[0]))
 
 
@@ -83,7 +81,7 @@ def test_an_error_that_no_block_shows_is_seen_by_check_points() -> None:
 def test_heights_may_displace_all_points_evenly_up_to_the_largest() -> None:
     folds = [partial(np.add, (0.01 * k, 0.0)) for k in range(5)]
     check = missed(CHECK, np.zeros_like(CHECK))
-    accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * np.array([0.6, 0.8])))
+    accuracy = ErrorModel(folds, check, Common(4.0 * np.array([0.6, 0.8]))).accuracy(PLACES)
     assert accuracy.ce50_px == pytest.approx(2.0, rel=0.05)
     assert accuracy.ce90_px == pytest.approx(3.6, rel=0.05)
 
@@ -92,13 +90,13 @@ def test_what_displaces_all_points_in_any_direction_is_normal() -> None:
     folds = [partial(np.add, (0.001 * k, 0.0)) for k in range(5)]
     check = missed(CHECK, np.zeros_like(CHECK))
     common = Common(sigma_px=0.5)
-    accuracy = predict_accuracy(folds, PLACES, check, common)
+    accuracy = ErrorModel(folds, check, common).accuracy(PLACES)
     # Circles of two normal variates: sqrt(-2 ln(1 - p)) standard deviations.
     assert accuracy.ce50_px == pytest.approx(0.5 * 1.177, rel=0.05)
     assert accuracy.ce90_px == pytest.approx(0.5 * 2.146, rel=0.05)
     assert accuracy.ellipse.minor_px == pytest.approx(0.5 * 2.146, rel=0.01)
     assert accuracy.heights_px == 0.0
-    sigma = standard_deviation_px(folds, PLACES, check, common)
+    sigma = ErrorModel(folds, check, common).standard_deviation_px(PLACES)
     assert sigma == pytest.approx(0.5, rel=0.01)
 
 
@@ -109,7 +107,7 @@ def test_the_ellipse_is_longest_along_what_heights_displace(angle_deg: float) ->
     along = np.array([math.sin(angle), -math.cos(angle)])
     folds = [partial(np.add, (0.01 * k, 0.01 * k**2)) for k in range(5)]
     check = missed(CHECK, np.zeros_like(CHECK))
-    accuracy = predict_accuracy(folds, PLACES, check, Common(4.0 * along))
+    accuracy = ErrorModel(folds, check, Common(4.0 * along)).accuracy(PLACES)
     # An even distribution to ±4 px has a standard deviation of 4 / √3; 90 % of two normal
     # variates lie within 2.146 of theirs.
     assert accuracy.ellipse.major_px == pytest.approx(2.146 * 4 / math.sqrt(3), rel=0.01)
@@ -154,9 +152,9 @@ def test_one_block_or_no_check_point_predicts_nothing() -> None:
     check = missed(CHECK, np.zeros_like(CHECK))
     none = missed(CHECK[:0], CHECK[:0])
     alike = partial(np.add, 0.0)
-    assert predict_accuracy([alike], PLACES, check, NOTHING) is UNKNOWN
-    assert predict_accuracy([alike] * 5, PLACES, none, NOTHING) is UNKNOWN
-    assert predict_accuracy([alike] * 5, PLACES, check, NOTHING).ce90_px == 0.0
+    assert ErrorModel([alike], check).accuracy(PLACES) is UNKNOWN
+    assert ErrorModel([alike] * 5, none).accuracy(PLACES) is UNKNOWN
+    assert ErrorModel([alike] * 5, check).accuracy(PLACES).ce90_px == 0.0
 
 
 def test_fewer_check_points_leave_a_wider_interval() -> None:
@@ -167,7 +165,7 @@ def test_fewer_check_points_leave_a_wider_interval() -> None:
         # The same error to the left and to the right in turns: nothing is shared.
         own = np.where((np.arange(len(px)) + np.arange(len(px)) // side) % 2, 0.5, -0.5)
         check = missed(px, np.column_stack([own, 0 * own]))
-        low, high = predict_accuracy(folds, PLACES, check, NOTHING).ce90_range_px
+        low, high = ErrorModel(folds, check).accuracy(PLACES).ce90_range_px
         return high / low
 
     assert width(2) > 1.2 * width(6)
@@ -184,7 +182,7 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
         matched = CHECK + random.standard_normal(CHECK.shape)
         check = missed(CHECK, matched - model(CHECK))
         place = random.uniform(0, SIZE_PX, (1, 2))
-        sigma = standard_deviation_px(folds, place, check, NOTHING)
+        sigma = ErrorModel(folds, check).standard_deviation_px(place)
         squared.append(((model(place) - place)[0] / sigma) ** 2)
     # 1, and a little more, as blocks know their variance badly; 160 values are good to 11 %.
     assert 0.75 < np.mean(squared) < 1.6
@@ -193,6 +191,6 @@ def test_the_standard_deviation_is_that_of_errors(kind: str) -> None:
 def test_heights_add_the_variance_of_an_even_distribution() -> None:
     still = [lambda px: px] * 4
     check = missed(CHECK, np.zeros(CHECK.shape))
-    found = standard_deviation_px(still, PLACES, check, Common(np.array([3.0, 3.0])))
+    found = ErrorModel(still, check, Common(np.array([3.0, 3.0]))).standard_deviation_px(PLACES)
     np.testing.assert_allclose(found, math.sqrt(3.0))
-    assert np.isinf(standard_deviation_px(still[:1], PLACES, check, NOTHING)).all()
+    assert np.isinf(ErrorModel(still[:1], check).standard_deviation_px(PLACES)).all()

@@ -74,7 +74,7 @@ def test_heights_that_spread_evenly_displace_by_their_width(
 ) -> None:
     """Chips that spread by ± 3 px along the range: the ground is the lowest, or the middle."""
     seen = replace(survey(), shifts_px=displaced(49, -3.0, 3.0))
-    found = evidence(GOOD, survey=seen, **more).common.heights_px
+    found = evidence(GOOD, survey=seen, **more).error.common.heights_px
     assert np.hypot(*found) == pytest.approx(expected_px, rel=0.15)
     assert abs(found @ RANGE) == pytest.approx(np.hypot(*found), rel=0.01)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -111,13 +112,9 @@ class Common:
 NOTHING_COMMON = Common()
 
 
-def predict_accuracy(
-    fold_models: Sequence[PointFunction],
-    places_px: FloatArray,
-    check: Misses,
-    common: Common,
-) -> Accuracy:
-    """Predict the error of a transform at a random one of some places.
+@dataclass(frozen=True)
+class ErrorModel:
+    """What is known of the error of a transform, by its points.
 
     Its random part is that of the models without one block of points after the other
     ([Efron1993]), with the mean of two variances at the check points: theirs, and what the check
@@ -129,79 +126,89 @@ def predict_accuracy(
     ----------
     fold_models
         The models without one block of points after the other, between pixel positions.
-    places_px
-        Places all over the overlap, shape (m, 2).
     check
         Points that took no part.
     common
         What displaces all points alike.
     """
-    count = len(fold_models)
-    if count < 2 or len(check.px) == 0:
-        return UNKNOWN
 
-    blocks = _block_variance_px2(fold_models, check)
-    shared, noise = shared_by_neighbours(check)
-    factor, deviations = _factor(blocks, shared), _deviations(fold_models, places_px)
-    random = np.random.default_rng(0)
-    parts = random.standard_normal((_DRAWS, count)) * factor
-    moved = np.einsum("dk,kmx->dmx", parts, deviations)
-    alike = random.uniform(-1, 1, (_DRAWS, 1, 1)) * common.heights_px
-    # So few blocks know their variance badly: Student's distribution.
-    known = random.chisquare(count - 1, (_DRAWS, 1, 1)) / (count - 1)
-    alike = alike + random.normal(0, common.sigma_px, (_DRAWS, 1, 2))
+    fold_models: Sequence[PointFunction]
+    check: Misses
+    common: Common = NOTHING_COMMON
 
-    def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
-        error = moved * scale + alike
-        return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
+    @property
+    def is_unknown(self) -> bool:
+        """Whether there are too few blocks, or no check points, to predict anything by."""
+        return len(self.fold_models) < 2 or len(self.check.px) == 0
 
-    ce50, ce90, ce95 = radii(1 / np.sqrt(known), (0.5, 0.9, 0.95))
-    freedom = _degrees_of_freedom(blocks, count, shared, noise)
-    low, high = (
-        radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
-        for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
-    )
-    # Heights displace evenly between both limits.
-    covariance = factor**2 * np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
-    covariance += np.outer(common.heights_px, common.heights_px) / 3
-    covariance += common.sigma_px**2 * np.eye(2)
-    return Accuracy(
-        ce50,
-        ce90,
-        ce95,
-        (min(low, ce90), max(high, ce90)),
-        Ellipse.of(covariance),
-        float(np.hypot(*common.heights_px)),
-    )
+    def accuracy(self, places_px: FloatArray) -> Accuracy:
+        """Predict the error at a random one of some places, shape (m, 2)."""
+        if self.is_unknown:
+            return UNKNOWN
+        count, common = len(self.fold_models), self.common
+        shared, noise = shared_by_neighbours(self.check)
+        blocks, factor = self._block_variance_px2, self._factor
+        deviations = self._deviations(places_px)
+        random = np.random.default_rng(0)
+        parts = random.standard_normal((_DRAWS, count)) * factor
+        moved = np.einsum("dk,kmx->dmx", parts, deviations)
+        alike = random.uniform(-1, 1, (_DRAWS, 1, 1)) * common.heights_px
+        # So few blocks know their variance badly: Student's distribution.
+        known = random.chisquare(count - 1, (_DRAWS, 1, 1)) / (count - 1)
+        alike = alike + random.normal(0, common.sigma_px, (_DRAWS, 1, 2))
 
+        def radii(scale: FloatArray | float, shares: Sequence[float]) -> list[float]:
+            error = moved * scale + alike
+            return [float(r) for r in np.quantile(np.hypot(error[..., 0], error[..., 1]), shares)]
 
-def standard_deviation_px(
-    fold_models: Sequence[PointFunction],
-    places_px: FloatArray,
-    check: Misses,
-    common: Common,
-) -> FloatArray:
-    """Return the standard deviation along an axis of a transform's error at places, shape (m,).
+        ce50, ce90, ce95 = radii(1 / np.sqrt(known), (0.5, 0.9, 0.95))
+        freedom = _degrees_of_freedom(blocks, count, shared, noise)
+        low, high = (
+            radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
+            for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
+        )
+        # Heights displace evenly between both limits.
+        covariance = factor**2 * np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
+        covariance += np.outer(common.heights_px, common.heights_px) / 3
+        covariance += common.sigma_px**2 * np.eye(2)
+        return Accuracy(
+            ce50,
+            ce90,
+            ce95,
+            (min(low, ce90), max(high, ce90)),
+            Ellipse.of(covariance),
+            float(np.hypot(*common.heights_px)),
+        )
 
-    What `predict_accuracy` draws from, without what so few blocks leave unknown of the variance;
-    infinite where that predicts nothing. Parameters are the same.
-    """
-    if len(fold_models) < 2 or len(check.px) == 0:
-        return np.full(len(places_px), np.inf)
-    factor = _factor(_block_variance_px2(fold_models, check), shared_by_neighbours(check)[0])
-    variance = (_deviations(fold_models, places_px) ** 2).sum(axis=0).mean(axis=-1) * factor**2
-    # Heights: of an even distribution between both limits.
-    alike = float((common.heights_px**2).mean()) / 3 + common.sigma_px**2
-    return np.asarray(np.sqrt(variance + alike))
+    def standard_deviation_px(self, places_px: FloatArray) -> FloatArray:
+        """Return the standard deviation of the error along an axis at places, shape (m,).
 
+        What `accuracy` draws from, without what so few blocks leave unknown of the variance;
+        infinite where that predicts nothing.
+        """
+        if self.is_unknown:
+            return np.full(len(places_px), np.inf)
+        random = (self._deviations(places_px) ** 2).sum(axis=0).mean(axis=-1) * self._factor**2
+        # Heights: of an even distribution between both limits.
+        alike = float((self.common.heights_px**2).mean()) / 3 + self.common.sigma_px**2
+        return np.asarray(np.sqrt(random + alike))
 
-def _deviations(fold_models: Sequence[PointFunction], px: FloatArray) -> FloatArray:
-    return jackknife_deviations([model(px) for model in fold_models])
+    def _deviations(self, px: FloatArray) -> FloatArray:
+        return jackknife_deviations([model(px) for model in self.fold_models])
 
+    @cached_property
+    def _block_variance_px2(self) -> float:
+        """Mean variance along an axis that blocks of points leave at the check points."""
+        return float((self._deviations(self.check.px) ** 2).sum(axis=0).mean())
 
-def _block_variance_px2(fold_models: Sequence[PointFunction], check: Misses) -> float:
-    """Return the mean variance along an axis that blocks of points leave at the check points."""
-    return float((_deviations(fold_models, check.px) ** 2).sum(axis=0).mean())
+    @cached_property
+    def _factor(self) -> float:
+        """By how much deviations are larger than those of blocks show.
+
+        Their variance is the mean of what blocks show and of what check points share.
+        """
+        blocks, shared = self._block_variance_px2, shared_by_neighbours(self.check)[0]
+        return 1.0 if blocks <= 0 else math.sqrt((blocks + shared) / (2 * blocks))
 
 
 def shared_by_neighbours(check: Misses) -> tuple[float, float]:
@@ -228,16 +235,6 @@ def _are_neighbours(px: FloatArray) -> Mask:
     apart = np.hypot(*(px[:, None] - px).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
     return np.asarray(apart <= NEIGHBOUR_SPACINGS * np.median(apart.min(axis=1)))
-
-
-def _factor(blocks_px2: float, shared_px2: float) -> float:
-    """Return by how much deviations are larger than those of blocks show: see `predict_accuracy`.
-
-    Their variance is the mean of what blocks show and of what check points share.
-    """
-    if blocks_px2 <= 0:
-        return 1.0
-    return math.sqrt((blocks_px2 + shared_px2) / (2 * blocks_px2))
 
 
 def _degrees_of_freedom(

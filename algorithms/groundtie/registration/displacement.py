@@ -41,7 +41,7 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
     def field_px(xy: FloatArray) -> FloatArray:
         px = matching.map_to_pixel(xy)
         moved = px - matching.map_to_pixel(transform.model(xy))
-        return np.column_stack([moved, evidence.standard_deviation_px(px)])
+        return np.column_stack([moved, evidence.error.standard_deviation_px(px)])
 
     nodes = lattice(matching, field_px)
     values = np.array(nodes.values[:, 1:-1, 1:-1])

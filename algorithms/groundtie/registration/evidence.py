@@ -13,13 +13,7 @@ import cv2
 import numpy as np
 
 from ..errors import GroundTieError
-from ..geometry.accuracy import (
-    UNKNOWN,
-    Accuracy,
-    Common,
-    predict_accuracy,
-    standard_deviation_px,
-)
+from ..geometry.accuracy import UNKNOWN, Accuracy, Common, ErrorModel
 from ..geometry.estimation import Estimate, jackknife_spread
 from ..geometry.judging import LARGEST_LOG10_CHANCE, SMALLEST_INLIER_SHARE, ce90_of_rmse
 from ..geometry.misses import Misses
@@ -27,7 +21,7 @@ from ..geometry.tie_points import TiePoints
 from ..masks.used import MaskUsed
 from ..matching.check import CHECK_RADIUS_PX
 from ..matching.surveys import Surveys
-from ..rasters.grid import FloatArray, Grid, PointFunction
+from ..rasters.grid import FloatArray, Grid
 from .layover import mean_of_heights_px
 from .scene import SceneInfo
 from .surface_masks import ModelFit
@@ -123,37 +117,32 @@ class Agreement:
     def of(
         cls,
         name: str,
-        misses: Misses,
+        error: ErrorModel,
         total: int,
         area: str,
         places_px: FloatArray,
-        fold_models: Sequence[PointFunction],
-        common: Common,
         tries: int = 1,
         least_share: float = SMALLEST_INLIER_SHARE,
         least_spread_px: FloatArray | float = 0.0,
     ) -> Agreement:
-        """Return how points agree by what a model misses those by that have a peak.
+        """Return how points agree by what is known of a transform's error.
 
         Parameters
         ----------
-        misses
-            Of points with a peak.
+        error
+            Its check points are those with a peak.
         total
             How many points there are, with and without one.
         places_px
             Places all over the area, shape (n, 2).
-        fold_models
-            The model without one block of its points after the other.
-        common
-            What displaces all points alike.
         tries
             How many registrations were tried, any of which might agree by chance.
         least_spread_px
             Standard deviation that the model's predictions there have at least, shape (n,).
         """
+        misses = error.check
         chance = min(misses.log10_chance(total) + math.log10(tries), 0.0)
-        spread_px = np.maximum(jackknife_spread(fold_models, places_px), least_spread_px)
+        spread_px = np.maximum(jackknife_spread(error.fold_models, places_px), least_spread_px)
         return cls(
             name,
             misses.agreeing,
@@ -163,7 +152,7 @@ class Agreement:
             misses.max_error_px,
             float(np.sqrt(np.mean(spread_px**2))),
             area,
-            predict_accuracy(fold_models, places_px, misses, common),
+            error.accuracy(places_px),
             least_share,
         )
 
@@ -269,16 +258,8 @@ class RegistrationEvidence(ImagesEvidence):
     @cached_property
     def held_out(self) -> Agreement:
         """How the check points agree; those without a peak count as disagreeing."""
-        return Agreement.of(
-            "check points",
-            self._misses,
-            len(self.check),
-            "the overlap",
-            self.grid.lattice(),
-            self._folds,
-            self.common,
-            self.tries,
-        )
+        count, places = len(self.check), self.grid.lattice()
+        return Agreement.of("check points", self.error, count, "the overlap", places, self.tries)
 
     @property
     def needs_second_confirmation(self) -> bool:
@@ -289,23 +270,16 @@ class RegistrationEvidence(ImagesEvidence):
         """
         return self.held_out.log10_chance > 2 * LARGEST_LOG10_CHANCE
 
-    def standard_deviation_px(self, px: FloatArray) -> FloatArray:
-        """Return that of the transform's error along an axis, shape (n,), at pixels (n, 2)."""
-        return standard_deviation_px(self._folds, px, self._misses, self.common)
-
     @cached_property
-    def _folds(self) -> tuple[PointFunction, ...]:
-        return self.estimate.folds_on(self.grid)
+    def error(self) -> ErrorModel:
+        """What is known of the transform's error, in matching pixels.
 
-    @cached_property
-    def _misses(self) -> Misses:
+        Heights displace all points alike, and so does what of a town is no ground.
+        """
         places = self.grid.map_to_pixel(self.counted.reference_xy)
-        return Misses(places, self.residuals_px, CHECK_RADIUS_PX, self.max_error_px)
-
-    @property
-    def common(self) -> Common:
-        """What displaces all points alike: heights, and what of a town is no ground."""
-        return Common(self._heights_px, self.mask.elevated_px)
+        misses = Misses(places, self.residuals_px, CHECK_RADIUS_PX, self.max_error_px)
+        common = Common(self._heights_px, self.mask.elevated_px)
+        return ErrorModel(self.estimate.folds_on(self.grid), misses, common)
 
     @cached_property
     def _heights_px(self) -> FloatArray:

@@ -137,7 +137,7 @@ def match_ground_control(
     heights = image.orientation.heights_at(points.reference_xy)
     control = ControlPoints.of(points, heights, image.orientation.crs)
     # As seen in the middle of the matched part.
-    grid, common = evidence.grid, evidence.common
+    grid, common = evidence.grid, evidence.error.common
     to_image = _matching_to_image(grid, by, grid.pixel_to_map([grid.centre_px]))[0]
     scale = float(np.sqrt(abs(np.linalg.det(to_image))))
     common = Common(to_image @ common.heights_px, scale * common.sigma_px)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..context import Context
-from ..geometry.accuracy import Common
+from ..geometry.accuracy import Common, ErrorModel
 from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
@@ -151,28 +151,27 @@ class PoseSurveyEvidence(ImagesEvidence):
     @cached_property
     def held_out(self) -> Agreement:
         """How each chip agrees with the pose as the others have it."""
-        heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
         return Agreement.of(
             "chips all over",
-            self._misses,
+            self._error,
             len(self.found.agrees),
             "the overlap",
             self.found.grid.lattice(),
-            self.found.fold_models,
-            Common(2 * heights),
             least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 
     @cached_property
-    def _misses(self) -> Misses:
+    def _error(self) -> ErrorModel:
         is_known = np.isfinite(self.found.residuals_px).all(axis=1)
-        return Misses(
+        misses = Misses(
             self.found.px[is_known].astype(float),
             self.found.residuals_px[is_known],
             SURVEY_RADIUS_PX,
             POSE_TOLERANCE_PX,
             POSE_TOLERANCE_PX,
         )
+        heights = mean_of_heights_px(self.surveys.whole, self.layover_factor, POSE_TOLERANCE_PX)
+        return ErrorModel(self.found.fold_models, misses, Common(2 * heights))
 
     @property
     def extrapolated_share(self) -> float:

@@ -13,7 +13,7 @@ from ..assessment.point_errors import PointErrors
 from ..assessment.statistics import Statistics
 from ..declaration import file_lines
 from ..errors import NotRegisteredError, TooFewPointsError
-from ..geometry.accuracy import NOTHING_COMMON, Common
+from ..geometry.accuracy import NOTHING_COMMON, Common, ErrorModel
 from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
 from ..kinds import plain
@@ -99,12 +99,10 @@ class RefinementEvidence:
         nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
         return Agreement.of(
             name,
-            self._misses,
+            self._error,
             len(after),
             "the image",
             nodes_px,
-            self.adjustment.fold_biases,
-            self.common,
             least_spread_px=self.adjustment.bias.sigma_px(nodes_px),
         )
 
@@ -112,13 +110,13 @@ class RefinementEvidence:
     def before(self) -> Statistics:
         """Errors at the held-out inliers by the RPCs as delivered, px."""
         _, points, _ = self._held
-        return Statistics.of(points.residuals_px(None)[self._misses.mixture.inliers])
+        return Statistics.of(points.residuals_px(None)[self._error.check.mixture.inliers])
 
     @property
     def after(self) -> Statistics:
         """Errors at the held-out inliers by the refined RPCs, px."""
         _, _, after = self._held
-        return Statistics.of(after[self._misses.mixture.inliers])
+        return Statistics.of(after[self._error.check.mixture.inliers])
 
     def summary(self) -> dict[str, Any]:
         """Return which points were held out, and their errors, as values that JSON can carry."""
@@ -138,11 +136,12 @@ class RefinementEvidence:
         return CHECK_POINTS, self.check, self.check.residuals_px(self.adjustment.bias)
 
     @cached_property
-    def _misses(self) -> Misses:
+    def _error(self) -> ErrorModel:
         _, points, after = self._held
         reach = max(int(np.ceil(np.hypot(*after.T).max(initial=0.0))), LEAST_REACH_PX)
         tolerance = max(TOLERANCE_PX, self.max_error_px)
-        return Misses(points.expected_px, after, reach, self.max_error_px, tolerance)
+        misses = Misses(points.expected_px, after, reach, self.max_error_px, tolerance)
+        return ErrorModel(self.adjustment.fold_biases, misses, self.common)
 
 
 @dataclass(frozen=True)
