@@ -84,6 +84,13 @@ def test_a_table_without_points(tmp_path: Path, suffix: str) -> None:
     assert found.used.shape == (0,)
 
 
+def test_a_table_of_other_columns_without_rows(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("id,x,y\n")
+    with pytest.raises(TransformFileError, match="column 'reference_x' is missing"):
+        read_tie_points(path, GRID)
+
+
 def test_geopackage_lines_run_from_the_nominal_to_the_reference_position(tmp_path: Path) -> None:
     points, transform = made(UTM, GRID)
     write_tie_points(tmp_path / "a.gpkg", points, transform)

@@ -53,7 +53,7 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
         comment = lines.pop(0)
         if comment.startswith("#CRS:"):
             crs = require_map(CRS.from_user_input(comment.removeprefix("#CRS:").strip()))
-    rows = table_rows(lines)
+    rows = table_rows(lines, ("mapX", "mapY"))
     # Older versions of QGIS called the columns so.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
     input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,15 +27,21 @@ SIGMA = ("sigma_x_px", "sigma_y_px")
 _FARTHEST = 1e10
 
 
-def table_rows(lines: Iterable[str]) -> list[Row]:
+def table_rows(lines: Iterable[str], needed: Sequence[str]) -> list[Row]:
     """Return the rows of a CSV table by the names of its columns.
 
     Raises
     ------
+    KeyError
+        One of the needed columns is missing in the first line, whether or not rows follow.
     ValueError
         A row has more fields than the first line, other than empty ones.
     """
-    rows = [dict(row) for row in csv.DictReader(lines)]
+    reader = csv.DictReader(lines)
+    rows = [dict(row) for row in reader]
+    for name in needed:
+        if name not in (reader.fieldnames or needed):
+            raise KeyError(name)
     for number, row in enumerate(rows, 1):
         if any(field.strip() for field in row.pop(None, ())):
             raise ValueError(

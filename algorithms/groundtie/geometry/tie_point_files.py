@@ -196,7 +196,7 @@ def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | No
         crs = CRS.from_user_input(named["properties"]["name"]) if named else LON_LAT
         return rows, ends, require_map(crs)
     with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = table_rows(file)
+        rows = table_rows(file, REFERENCE)
     return rows, line_ends([None] * len(rows)), None
 
 
