@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from raster_files import UTM, utm_grid
 from rasterio.crs import CRS
 
-from groundtie.assessment.consistency import Leg, consistency, lattice
+from groundtie.assessment.consistency import Leg, consistency, spread_over
 from groundtie.assessment.point_errors import PointErrors
 from groundtie.errors import GeoreferencingError, NoOverlapError
 from groundtie.geometry.fitting import fit_model
@@ -112,8 +112,8 @@ class TestTwoWay:
         half = A.window(0, 0, 96, 160)
         found = two_way(shifted(0, 0, B), shifted(0, 0, half))
         whole = two_way(shifted(0, 0, B), shifted(0, 0, A))
-        assert len(found) == (lattice(B)[:, 0] < 191.5).sum()
-        assert len(whole) == len(lattice(B))
+        assert len(found) == (spread_over(B)[:, 0] < 191.5).sum()
+        assert len(whole) == len(spread_over(B))
 
     def test_a_flexible_way_back_is_followed_everywhere(self) -> None:
         """A bulge of 15 m in a thin-plate spline shows at its place, and only there."""
@@ -191,7 +191,7 @@ class TestThreeWay:
         onward = Leg("onward.json", shifted(0, 0, part))
         way = [onward, Leg("closing.json", shifted(0, 0, A))]
         found = consistency(Leg("t.json", shifted(0, 0, B)), way)
-        assert len(found) == (lattice(B)[:, 1] < 159.5).sum()
+        assert len(found) == (spread_over(B)[:, 1] < 159.5).sum()
         onward = Leg("onward.json", shifted(0, 0, C.window(900, 0, 10, 10)))
         with pytest.raises(NoOverlapError, match=r"t\.json, onward\.json, closing\.json"):
             consistency(Leg("t.json", shifted(0, 0, B)), [onward, way[1]])
@@ -213,7 +213,7 @@ class TestLattice:
     @pytest.mark.slow
     @given(st.integers(1, 4000), st.integers(1, 4000))
     def test_it_covers_the_grid_evenly(self, width: int, height: int) -> None:
-        px = lattice(Grid(PIXEL_COORDINATES, None, width, height))
+        px = spread_over(Grid(PIXEL_COORDINATES, None, width, height))
         for axis, side in zip(px.T, (width, height), strict=True):
             places = np.unique(axis)
             # From half a step within one border to half a step within the other
@@ -224,5 +224,5 @@ class TestLattice:
         assert len(np.unique(px, axis=0)) == len(px)
 
     def test_small_grids_have_a_place_a_pixel(self) -> None:
-        px = lattice(Grid(PIXEL_COORDINATES, None, 3, 2))
+        px = spread_over(Grid(PIXEL_COORDINATES, None, 3, 2))
         assert px.tolist() == [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]

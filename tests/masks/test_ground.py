@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
 
 from groundtie.errors import RasterContentError
-from groundtie.masks.ground import distance_back_px, find_ground, open_ground, shows_ground
+from groundtie.masks.ground import (
+    distance_back_px,
+    find_ground,
+    ground_between_buildings,
+    shows_ground,
+)
 from groundtie.masks.scene import Scene
 from groundtie.rasters.reading import Mask, open_raster
 
@@ -41,7 +46,7 @@ def test_ground_lies_between_shadow_and_layover_and_roofs_do_not(
     quarters: int, pixel_m: float
 ) -> None:
     level, ground, roofs = town(pixel_m, quarters)
-    found = open_ground(level, np.ones(level.shape, bool), pixel_m)
+    found = ground_between_buildings(level, np.ones(level.shape, bool), pixel_m)
     assert found[ground].mean() > 0.7
     assert found[roofs].mean() < 0.05
     assert found[~ground & ~roofs].mean() < 0.01
@@ -49,7 +54,7 @@ def test_ground_lies_between_shadow_and_layover_and_roofs_do_not(
 
 def test_large_pixels_beside_a_building_are_no_ground() -> None:
     level, ground, _ = town(1.0)
-    found = open_ground(level, np.ones(level.shape, bool), 10.0)
+    found = ground_between_buildings(level, np.ones(level.shape, bool), 10.0)
     inner = ground[:, 1:-1] & ground[:, :-2] & ground[:, 2:]
     outer = ground[:, 1:-1] & ~inner
     assert found[:, 1:-1][inner].any() and not found[:, 1:-1][outer].any()
@@ -59,7 +64,7 @@ def test_ground_is_sought_in_valid_pixels_alone() -> None:
     level, ground, _ = town(0.5)
     valid = np.ones(level.shape, bool)
     valid[: len(level) // 2] = False
-    found = open_ground(level, valid, 0.5)
+    found = ground_between_buildings(level, valid, 0.5)
     assert not found[~valid].any()
     assert found[ground & valid].mean() > 0.5
 

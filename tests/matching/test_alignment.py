@@ -16,9 +16,9 @@ from groundtie.geometry.terrain import Terrain
 from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.matching import alignment
 from groundtie.matching.alignment import (
-    CANDIDATES,
     IDENTITY,
     LINEAR_CANDIDATES,
+    MODEL_CANDIDATES,
     TERRAIN_CANDIDATES,
     Prior,
     _fields,
@@ -124,12 +124,12 @@ def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", CANDIDATES)
+@pytest.mark.parametrize("kind", MODEL_CANDIDATES)
 @pytest.mark.parametrize("seed", range(2))
 def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int, fitted: list[str]) -> None:
     px = centres()
     chosen = align(
-        CANDIDATES,
+        MODEL_CANDIDATES,
         px,
         surfaces_of(kind, px, PRIORS[1], seed),
         Prior.of_affine(PRIORS[1]),
@@ -137,7 +137,7 @@ def test_the_simplest_model_that_fits_is_chosen(kind: str, seed: int, fitted: li
     )
     assert chosen.model.kind == kind
     assert error_px(chosen.model, kind) < 0.1
-    assert fitted == list(CANDIDATES)
+    assert fitted == list(MODEL_CANDIDATES)
 
 
 def test_nothing_is_chosen_but_candidates(fitted: list[str]) -> None:
@@ -163,14 +163,14 @@ def test_few_chips_take_no_model_of_many_parameters(fitted: list[str]) -> None:
     px = centres()[::25]
     assert len(px) == 8
     prior = Affine.identity()
-    align(CANDIDATES, px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
+    align(MODEL_CANDIDATES, px, surfaces_of("translation", px, prior, 0, 0), IDENTITY, identity())
     assert fitted == ["translation", "similarity"]
 
 
 def test_surfaces_without_peaks_leave_a_finite_model() -> None:
     px = centres()
     flat = np.zeros((len(px), SPAN, SPAN), np.float32)
-    found = align(CANDIDATES, px, flat, IDENTITY, identity())
+    found = align(MODEL_CANDIDATES, px, flat, IDENTITY, identity())
     assert found.model.kind == "translation"
     np.testing.assert_allclose(found.model(px), px, atol=1e-9)
 

@@ -22,7 +22,7 @@ from groundtie.geometry.models import Model
 from groundtie.geometry.transform import Transform
 from groundtie.matching import keypoints
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.feature_fit import Fit
+from groundtie.matching.feature_fit import ConsensusFit
 from groundtie.matching.held_out import HeldOut
 from groundtie.matching.keypoint_fit import KeypointFit, agreeing_keypoints
 from groundtie.matching.keypoints import KeypointMatcher
@@ -70,14 +70,14 @@ def keypoints_of(
     coarse: Model = COARSE,
     detector: Detecting = KEYPOINTS[0],
     descriptor: Describing = KEYPOINTS[1],
-) -> tuple[Correspondences, Fit]:
+) -> tuple[Correspondences, ConsensusFit]:
     """Return what keypoints show without chips."""
     matcher = KeypointMatcher(pair, detector, descriptor, held_out=HeldOut.of(pair))
     with threads(2) as context:
         return agreeing_keypoints(matcher, coarse, kind, context)
 
 
-def error_of(fit: Fit, files: TexturedPair) -> float:
+def error_of(fit: ConsensusFit, files: TexturedPair) -> float:
     nominal = Transform.nominal(files.grid.crs, files.truth.input_grid)
     model = fit.model.on_map(files.grid.centre_transform)
     return error_px(replace(nominal, model=model), files)

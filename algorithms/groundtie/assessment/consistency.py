@@ -96,7 +96,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
         There is no place that all transforms reach.
     """
     own = transform.transform.input_grid
-    start_px = lattice(own)
+    start_px = spread_over(own)
     xy, crs, name = own.pixel_to_map(start_px), own.crs, transform.name
     for leg in way:
         xy, inside = leg.follow(_entering(leg, xy, crs, name))
@@ -118,7 +118,7 @@ def _entering(leg: Leg, xy: FloatArray, crs: CRS | None, name: str) -> FloatArra
     return reproject(xy, crs, leg.start_crs)
 
 
-def lattice(grid: Grid) -> FloatArray:
+def spread_over(grid: Grid) -> FloatArray:
     """Return pixel positions (col, row) spread evenly over a grid, from border to border, (n, 2).
 
     No pixel is taken twice.

@@ -76,10 +76,10 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
         )
     image = ReducedScene.of(scene, progress)
     level_db, _ = image.without_speckle()
-    return image.mask(open_ground(level_db, image.patch.valid, image.pixel_m))
+    return image.mask(ground_between_buildings(level_db, image.patch.valid, image.pixel_m))
 
 
-def open_ground(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
+def ground_between_buildings(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     """Return the ground between the buildings of a radar image.
 
     It is where the geometric mean of distances is large: to the nearest layover and to the nearest

@@ -43,9 +43,9 @@ _STEPS = 60
 _HEIGHT_PASSES = 3
 
 # From simple to flexible, those that "auto" chooses from; see `align`.
-CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
-LINEAR_CANDIDATES = CANDIDATES[:3]
-TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *CANDIDATES[3:])
+MODEL_CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
+LINEAR_CANDIDATES = MODEL_CANDIDATES[:3]
+TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *MODEL_CANDIDATES[3:])
 
 
 # The four weights of a cubic B-spline, and their derivatives, are polynomials of the way between

@@ -25,7 +25,7 @@ from .matcher import MaskOf
 
 # The longer side of the reduced image, in pixels, and how many candidates are kept.
 LEVEL_SIDE_PX = 512
-CANDIDATES = 4
+MOST_CANDIDATES = 4
 
 # Candidates lower than this share of the best are not worth their cost.
 _LOW = 0.4
@@ -87,7 +87,9 @@ def coarse_candidates(
         return [Candidate(_shift_on_map(place, level), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
-    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())[:CANDIDATES]
+    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())[
+        :MOST_CANDIDATES
+    ]
     high = [one for one in found if one.height > found[0].height * _LOW]
     poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
     if not poses:
@@ -151,7 +153,7 @@ def _places(
         MINIMUM_OVERLAP * valid,
     )
     found: list[Peak] = []
-    for _ in range(CANDIDATES):
+    for _ in range(MOST_CANDIDATES):
         peak = find_peak(surface)
         if peak.height <= (found[0].height * _LOW if found else 0.0):
             break

@@ -35,13 +35,13 @@ _RIVAL_ALARMS = -10.0
 
 
 @dataclass(frozen=True)
-class Fit(Fitted):
+class ConsensusFit(Fitted):
     """A model that matches agree on; `mixture` has which are inliers."""
 
     mixture: Mixture
 
 
-def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -> Fit:
+def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -> ConsensusFit:
     """Fit a model to matches of which most may be outliers.
 
     Parameters
@@ -75,7 +75,7 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
     if 2 * agreeing <= PARAMETERS[kind]:
         raise TooFewPointsError(f"only {agreeing} of {len(px)} features agree with a model")
     weights = np.where(mixture.inliers, mixture.probability, 0.0)
-    return Fit(model, fit_without_blocks(kind, px, nominal_px, weights), mixture)
+    return ConsensusFit(model, fit_without_blocks(kind, px, nominal_px, weights), mixture)
 
 
 def first_kind(kind: str) -> str:

@@ -23,7 +23,7 @@ from ..geometry.tie_points import USED, TiePoints
 from ..kinds import AUTO
 from ..rasters.grid import FloatArray, Grid, apply_affine
 from .chips import ChipMatcher
-from .feature_fit import Fit, first_kind, fit_matches, require_no_rival
+from .feature_fit import ConsensusFit, first_kind, fit_matches, require_no_rival
 from .frames import on_grid
 from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
@@ -102,7 +102,7 @@ class KeypointFit:
             known = apply_affine(on_grid(coarse, self._grid), matches.px)
             model = fit_model("affine", matches.px, known)
             # Without models of its folds: how far it may be wrong is unknown.
-            start = Fit(model, (), fit.mixture)
+            start = ConsensusFit(model, (), fit.mixture)
             refined = self._refined(first, matches, coarse, start, context.part(0.7, 1.0))
         return self._estimate(kind, *refined)
 
@@ -111,8 +111,13 @@ class KeypointFit:
         return self.matcher.pair.grid
 
     def _refined(
-        self, kind: str, matches: Correspondences, coarse: Model, fit: Fit, context: Context
-    ) -> tuple[Correspondences, Model, Fit]:
+        self,
+        kind: str,
+        matches: Correspondences,
+        coarse: Model,
+        fit: ConsensusFit,
+        context: Context,
+    ) -> tuple[Correspondences, Model, ConsensusFit]:
         """Return chips around keypoints, the model that they were resampled by, and their fit.
 
         Matches with larger errors may have led the first model, `fit`, astray: if chips show it,
@@ -143,7 +148,9 @@ class KeypointFit:
                 break
         return found, coarse, fit
 
-    def _estimate(self, kind: str, matches: Correspondences, coarse: Model, fit: Fit) -> Estimate:
+    def _estimate(
+        self, kind: str, matches: Correspondences, coarse: Model, fit: ConsensusFit
+    ) -> Estimate:
         pair, grid = self.matcher.pair, self._grid
         count, sigma = len(matches.px), fit.mixture.sigma
         points = TiePoints(
@@ -195,7 +202,7 @@ class GuidedFit:
 
 def agreeing_keypoints(
     matcher: KeypointMatcher, coarse: Model, kind: str, context: Context
-) -> tuple[Correspondences, Fit]:
+) -> tuple[Correspondences, ConsensusFit]:
     """Return matches of keypoints, few enough of each place, and the model of most of them.
 
     Parameters and errors as `KeypointFit.estimate` has them.

@@ -22,7 +22,7 @@ from ..kinds import AUTO
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..similarity.peak import Peak, find_peak, find_peak_near
-from .alignment import CANDIDATES, Prior, align
+from .alignment import MODEL_CANDIDATES, Prior, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .frames import on_grid
@@ -58,7 +58,7 @@ class SurfaceFit:
 
     matcher: SurfaceMatcher
     layout: ChipLayout
-    candidates: tuple[str, ...] = CANDIDATES
+    candidates: tuple[str, ...] = MODEL_CANDIDATES
     terrain: Terrain | None = None
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:

@@ -61,7 +61,10 @@ class Masked:
         return replace(self, pair=replace(pair, reference=self.pair.reference))
 
     def exchanged(self) -> Masked:
-        """Return the same with the roles of both images exchanged."""
+        """Return the same masks with the roles of both images exchanged.
+
+        What is known of the images still names them by their first roles.
+        """
         return replace(self, pair=self.pair.exchanged())
 
 

@@ -10,7 +10,7 @@ from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..geometry.views import RADAR, View
 from ..kinds import AUTO
 from ..masks.used import INPUT, REFERENCE
-from ..matching.alignment import CANDIDATES
+from ..matching.alignment import MODEL_CANDIDATES
 from ..rasters.rendered import Light
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
@@ -128,7 +128,7 @@ class Specification:
     similarity: str = "fused"
     refinement: str = "fused"
     model: str = AUTO
-    candidates: tuple[str, ...] = CANDIDATES
+    candidates: tuple[str, ...] = MODEL_CANDIDATES
     max_error_px: float = USUAL_MAX_ERROR_PX
     search_radius_m: float | None = None
     rotation_deg: float | None = None

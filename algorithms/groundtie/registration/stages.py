@@ -37,7 +37,7 @@ from .specification import CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
 
-class Fit(Protocol):
+class Fitter(Protocol):
     """What finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
@@ -69,7 +69,7 @@ class Stages:
     spec: Specification
     held_out: HeldOut
     matcher: SurfaceMatcher
-    fit: Fit
+    fit: Fitter
 
     @classmethod
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
@@ -178,7 +178,7 @@ def _fit(
     matcher: SurfaceMatcher,
     held_out: HeldOut,
     spec: Specification,
-) -> Fit:
+) -> Fitter:
     """Return what fits the model, by the name of the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
@@ -188,7 +188,8 @@ def _fit(
             # Polynomials bend along what no rendering shows: land cover and what is laid over.
             candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
         return SurfaceFit(matcher, layout, candidates, terrain=terrain)
-    shown = None if pair is images else pair
+    is_masked = any(image.mask is not None for image in (pair.reference, pair.input))
+    shown = pair if is_masked else None
     chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
     # Detectors and descriptors were chosen among many by `detector_repeatability` and `make bench`
     # (see `studies`).

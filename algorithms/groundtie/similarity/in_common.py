@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch, reduced_patch
 from ..rasters.reading import Mask
 from .sameness import FARTHEST_PX, Edges, Windows, edges_apart_px
-from .seams import DRAWN_WIDTH, STANDARD_ERRORS, step_width
+from .seams import DRAWN_WIDTH, ONE_SIDED_5_PERCENT, step_width
 
 # None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
 _CHANCE_OFFSETS = 8
@@ -257,12 +257,12 @@ def _most_of(some: NDArray[np.int_]) -> float:
     chance = some[1:].mean()
     # Of counts, which vary as much as they are many.
     error = np.sqrt(some[0] + chance / _CHANCE_OFFSETS + 1)
-    return float(max(some[0] - chance, 0.0) + STANDARD_ERRORS * error)
+    return float(max(some[0] - chance, 0.0) + ONE_SIDED_5_PERCENT * error)
 
 
 def _more_of(sides: NDArray[np.int_]) -> float:
     """Return how many more edges lie to one side than to the other, at least, by their counts."""
-    return float(abs(sides[1] - sides[0]) - STANDARD_ERRORS * np.sqrt(sides.sum()))
+    return float(abs(sides[1] - sides[0]) - ONE_SIDED_5_PERCENT * np.sqrt(sides.sum()))
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:

@@ -28,7 +28,7 @@ _LAGS, _NEAR = 16, 3
 _LAG = np.arange(-_LAGS, _LAGS + 1)
 
 # What is so many standard deviations more is exceeded by chance with 5 %.
-STANDARD_ERRORS = 1.645
+ONE_SIDED_5_PERCENT = 1.645
 
 # Steps of what is drawn are no wider. Suite sharpness: of different sensors' ground at its place
 # from 0.51 on; of seams, stripes and lines of maps from 0.04 on, mostly below this.
@@ -63,7 +63,9 @@ def step_width(products: NDArray[np.floating]) -> float:
     aligned = np.sum([np.roll(of, -lag) for of, lag in zip(products, best, strict=True)], axis=0)
     far = aligned[np.abs(_LAG) > _NEAR]
     here, *beside = (float(aligned[_LAGS + k] - far.mean()) for k in (0, -1, 1))
-    return (max(*beside, 0.0) + STANDARD_ERRORS * float(far.std())) / here if here > 0 else np.inf
+    return (
+        (max(*beside, 0.0) + ONE_SIDED_5_PERCENT * float(far.std())) / here if here > 0 else np.inf
+    )
 
 
 def seams(reference: Patch, input: Patch) -> Mask:
