@@ -124,16 +124,17 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
             assert (info.sensors is Sensors.DIFFERENT) == (looks < 20)
             assert info.sensors is not Sensors.RADARS
         assert (twice.sensors is Sensors.RADARS) == (looks < 20)
-        # What is declared counts, but that a rough image beside a smooth one is a camera's.
-        is_rough = looks < 20
+        appears = Sensors.DIFFERENT if looks < 20 else Sensors.CAMERAS
         for info, declared, expected in (
             (twice, REFERENCE, Sensors.DIFFERENT),
             (one_way, REFERENCE, Sensors.DIFFERENT),
             (one_way, BOTH, Sensors.RADARS),
             (twice, NEITHER, Sensors.CAMERAS),
-            (one_way, NEITHER, Sensors.DIFFERENT if is_rough else Sensors.CAMERAS),
+            (one_way, NEITHER, Sensors.CAMERAS),
         ):
             assert replace(info, declared=declared).sensors is expected
+        for declared in (BOTH, NEITHER):
+            assert replace(one_way, declared=declared).apparent is appears
 
 
 def test_metadata_count_before_speckle(tmp_path: Path) -> None:

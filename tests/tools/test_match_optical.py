@@ -107,7 +107,7 @@ def test_a_radar_image_that_may_show_a_town_is_in_doubt(
 ) -> None:
     """Refused as a whole, it is tried by its ground, which counts."""
     sensors = Sensors.DIFFERENT if is_radar else Sensors.CAMERAS
-    monkeypatch.setattr(SceneInfo, "sensors", sensors)
+    monkeypatch.setattr(SceneInfo, "apparent", sensors)
     monkeypatch.setattr(SceneInfo, "is_despeckled_town", False)
     # Too few strong scatterers for a town, too many for one to be ruled out.
     monkeypatch.setattr(ImageFacts, "strong_share", 0.1)

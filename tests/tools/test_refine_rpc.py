@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +105,9 @@ def test_what_displaces_the_match_displaces_the_rpcs(
 ) -> None:
     """3 m, in matching pixels; the image's pixels are 1 m."""
     alike = Common(np.array([3.0 / pixel_m, 0.0]))
-    monkeypatch.setattr(RegistrationEvidence, "common", alike)
+    plain = RegistrationEvidence.error.func
+    error = property(lambda evidence: replace(plain(evidence), common=alike))
+    monkeypatch.setattr(RegistrationEvidence, "error", error)
     found = groundtie.refine_rpc(
         scene.image,
         tmp_path / "refined_RPC.TXT",

@@ -66,9 +66,9 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
         Whether they have georeferencing.
     """
     chips = Try("coregister", COREGISTER, "other images match by chips")
-    if scene.sensors is Sensors.DIFFERENT:
+    if scene.apparent is Sensors.DIFFERENT:
         tries = [replace(chips, because="a radar image and a camera's match by chips")]
-    elif scene.sensors is Sensors.RADARS:
+    elif scene.apparent is Sensors.RADARS:
         because = "both images are a radar's, which share keypoints"
         tries = [Try("match_sar_sar", SAR_SAR, because), chips]
     else:

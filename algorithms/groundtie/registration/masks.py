@@ -87,7 +87,7 @@ def with_ground_mask(
     context
         Threads and progress.
     """
-    if scene.sensors is not Sensors.DIFFERENT:
+    if scene.apparent is not Sensors.DIFFERENT:
         return Masked(pair, scene, MaskUsed.none("there is no radar image beside a camera's"))
     if not scene.is_town:
         reason = f"{_shown(scene)}: too few for a town"
@@ -119,7 +119,7 @@ def ground_instead(
         used = MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX)
         is_part = not used.leaves_little and share <= _MOST_OPEN
         return Masked(image, scene, used) if is_part else None
-    if scene.sensors is Sensors.DIFFERENT and scene.may_be_town and scene.shows_ground:
+    if scene.apparent is Sensors.DIFFERENT and scene.may_be_town and scene.shows_ground:
         return _of_town(pair, scene, stack, context)
     return None
 

@@ -143,14 +143,18 @@ class SceneInfo:
         """The other image."""
         return self.input if self.radar_name == REFERENCE else self.reference
 
-    @cached_property
+    @property
     def sensors(self) -> Sensors:
-        """What the images are: as declared, else by metadata and speckle.
+        """What the images are: what a tool is for, else what they appear to be."""
+        return {BOTH: Sensors.RADARS, NEITHER: Sensors.CAMERAS}.get(self.declared, self.apparent)
 
-        Where neither is declared to be a radar's, both may be rough, but not one alone.
+    @cached_property
+    def apparent(self) -> Sensors:
+        """What the images appear to be: by stated views, else by metadata and speckle.
+
+        Towns are looked for by this, whatever a tool is for: where one image alone has speckle, the
+        other may be a camera's.
         """
-        if self.declared == BOTH:
-            return Sensors.RADARS
         if self.declared in (REFERENCE, INPUT):
             return Sensors.DIFFERENT
         radar, other = self.radar, self.other
@@ -159,7 +163,7 @@ class SceneInfo:
         if not radar.is_known_radar and self._is_far_rougher:
             return Sensors.DIFFERENT
         if other.is_known_radar or other.has_speckle:
-            return Sensors.CAMERAS if self.declared == NEITHER else Sensors.RADARS
+            return Sensors.RADARS
         return Sensors.DIFFERENT if radar.is_known_radar else Sensors.CAMERAS
 
     @property
@@ -174,7 +178,7 @@ class SceneInfo:
     @property
     def is_town(self) -> bool:
         """Whether the radar image of a pair with a camera's shows a town."""
-        return self.sensors is Sensors.DIFFERENT and self.radar.strong_share >= TOWN_SHARE
+        return self.apparent is Sensors.DIFFERENT and self.radar.strong_share >= TOWN_SHARE
 
     @property
     def shows_ground(self) -> bool:
@@ -197,9 +201,9 @@ class SceneInfo:
         Without its speckle a radar image cannot be distinguished from a camera's, with fewer
         strong scatterers; both images are checked then, unless they are declared to be a camera's.
         """
-        if self.sensors is Sensors.RADARS:
+        if self.apparent is Sensors.RADARS:
             return False
-        if self.sensors is Sensors.DIFFERENT:
+        if self.apparent is Sensors.DIFFERENT:
             return self.radar.strong_share >= PERHAPS_TOWN_SHARE
         suspects = () if self.declared == NEITHER else (self.reference, self.input)
         return any(one.strong_share >= PERHAPS_TOWN_SHARE for one in suspects)
@@ -211,7 +215,7 @@ class SceneInfo:
         Speckle filters leave no number of looks, and smooth roofs as they smooth the ground. A mask
         of the user's needs no speckle.
         """
-        is_despeckled = self.sensors is Sensors.DIFFERENT and not self.radar.has_speckle
+        is_despeckled = self.apparent is Sensors.DIFFERENT and not self.radar.has_speckle
         return is_despeckled and self.may_be_town and not self.has_user_mask
 
     def summary(self) -> dict[str, Any]:
@@ -223,15 +227,15 @@ class SceneInfo:
             if values:
                 found[name] = values
         known = vars(self)
-        if "sensors" in known:
-            found["sensors"] = self.sensors.value
+        if "apparent" in known:
+            found["sensors"] = self.apparent.value
         return found | {key: known[key] for key in ("radar_name",) if key in known}
 
     def facts(self) -> dict[str, str]:
         """Return the facts that were found, in words for people; nothing is read."""
-        if "sensors" not in vars(self) or self.sensors is Sensors.CAMERAS:
+        if "apparent" not in vars(self) or self.apparent is Sensors.CAMERAS:
             return {}
-        if self.sensors is Sensors.RADARS:
+        if self.apparent is Sensors.RADARS:
             return {"images": "both are a radar's"}
         facts = {"radar image": self.radar_name}
         radar = vars(self.radar)
