@@ -12,6 +12,7 @@ import pytest
 from evidences import facts, scene
 from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
 
+from groundtie.kinds import AUTO
 from groundtie.masks.used import INPUT, REFERENCE
 from groundtie.matching.locked import Sensors
 from groundtie.rasters.pair import Image, make_pair
@@ -126,7 +127,8 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
         assert (twice.sensors is Sensors.RADARS) == (looks < 20)
         appears = Sensors.DIFFERENT if looks < 20 else Sensors.CAMERAS
         for info, declared, expected in (
-            (twice, REFERENCE, Sensors.DIFFERENT),
+            # A mask is made of what is declared of one image, whatever the other is.
+            (twice, REFERENCE, Sensors.RADARS if looks < 20 else Sensors.DIFFERENT),
             (one_way, REFERENCE, Sensors.DIFFERENT),
             (one_way, BOTH, Sensors.RADARS),
             (twice, NEITHER, Sensors.CAMERAS),
@@ -135,6 +137,16 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
             assert replace(info, declared=declared).sensors is expected
         for declared in (BOTH, NEITHER):
             assert replace(one_way, declared=declared).apparent is appears
+
+
+def test_two_rough_images_are_tested_for_layover_whatever_their_units() -> None:
+    """Power varies far more than amplitudes; towns are looked for in both."""
+    both = scene(facts(variation2=5.0, strong_share=0.25), facts(variation2=0.2))
+    for declared in (AUTO, REFERENCE, BOTH):
+        assert replace(both, declared=declared).sensors is Sensors.RADARS
+    assert both.apparent is Sensors.DIFFERENT
+    assert both.is_town and not both.may_be_town
+    assert replace(both, declared=NEITHER).are_both_rough
 
 
 def test_metadata_count_before_speckle(tmp_path: Path) -> None:

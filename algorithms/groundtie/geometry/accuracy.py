@@ -146,7 +146,7 @@ class ErrorModel:
         if self.is_unknown:
             return UNKNOWN
         count, common = len(self.fold_models), self.common
-        shared, noise = shared_by_neighbours(self.check)
+        shared, noise = self._shared
         blocks, factor = self._block_variance_px2, self._factor
         deviations = self._deviations(places_px)
         random = np.random.default_rng(0)
@@ -197,6 +197,10 @@ class ErrorModel:
         return jackknife_deviations([model(px) for model in self.fold_models])
 
     @cached_property
+    def _shared(self) -> tuple[float, float]:
+        return shared_by_neighbours(self.check)
+
+    @cached_property
     def _block_variance_px2(self) -> float:
         """Mean variance along an axis that blocks of points leave at the check points."""
         return float((self._deviations(self.check.px) ** 2).sum(axis=0).mean())
@@ -207,7 +211,7 @@ class ErrorModel:
 
         Their variance is the mean of what blocks show and of what check points share.
         """
-        blocks, shared = self._block_variance_px2, shared_by_neighbours(self.check)[0]
+        blocks, shared = self._block_variance_px2, self._shared[0]
         return 1.0 if blocks <= 0 else math.sqrt((blocks + shared) / (2 * blocks))
 
 

@@ -87,10 +87,8 @@ def coarse_candidates(
         return [Candidate(_shift_on_map(place, level), place.height) for place in places]
     windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
     pose_limits = windows.limits(limits.rotation_deg, limits.scale)
-    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())[
-        :MOST_CANDIDATES
-    ]
-    high = [one for one in found if one.height > found[0].height * _LOW]
+    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())
+    high = [one for one in found[:MOST_CANDIDATES] if one.height > found[0].height * _LOW]
     poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
     if not poses:
         return []

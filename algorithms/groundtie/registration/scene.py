@@ -145,8 +145,17 @@ class SceneInfo:
 
     @property
     def sensors(self) -> Sensors:
-        """What the images are: what a tool is for, else what they appear to be."""
-        return {BOTH: Sensors.RADARS, NEITHER: Sensors.CAMERAS}.get(self.declared, self.apparent)
+        """What the images are: what a tool is for; else two radars' if both are rough.
+
+        However much rougher one is, as power is than amplitudes: layover is tested for then.
+        """
+        shown = Sensors.RADARS if self.are_both_rough else self.apparent
+        return {BOTH: Sensors.RADARS, NEITHER: Sensors.CAMERAS}.get(self.declared, shown)
+
+    @cached_property
+    def are_both_rough(self) -> bool:
+        """Whether both images have the speckle of a radar's, or metadata that name one."""
+        return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
 
     @cached_property
     def apparent(self) -> Sensors:
@@ -157,12 +166,12 @@ class SceneInfo:
         """
         if self.declared in (REFERENCE, INPUT):
             return Sensors.DIFFERENT
-        radar, other = self.radar, self.other
+        radar = self.radar
         if not (radar.is_known_radar or radar.has_speckle):
             return Sensors.CAMERAS
         if not radar.is_known_radar and self._is_far_rougher:
             return Sensors.DIFFERENT
-        if other.is_known_radar or other.has_speckle:
+        if self.are_both_rough:
             return Sensors.RADARS
         return Sensors.DIFFERENT if radar.is_known_radar else Sensors.CAMERAS
 
@@ -201,7 +210,7 @@ class SceneInfo:
         Without its speckle a radar image cannot be distinguished from a camera's, with fewer
         strong scatterers; both images are checked then, unless they are declared to be a camera's.
         """
-        if self.apparent is Sensors.RADARS:
+        if self.are_both_rough:
             return False
         if self.apparent is Sensors.DIFFERENT:
             return self.radar.strong_share >= PERHAPS_TOWN_SHARE
@@ -218,6 +227,12 @@ class SceneInfo:
         is_despeckled = self.apparent is Sensors.DIFFERENT and not self.radar.has_speckle
         return is_despeckled and self.may_be_town and not self.has_user_mask
 
+    @property
+    def _shown(self) -> Sensors | None:
+        """What the images were found to be; None: nobody asked."""
+        known = vars(self)
+        return Sensors.RADARS if known.get("are_both_rough") else known.get("apparent")
+
     def summary(self) -> dict[str, Any]:
         """Return the facts that were found, as values that JSON can carry; nothing is read."""
         found: dict[str, Any] = {}
@@ -227,16 +242,19 @@ class SceneInfo:
             if values:
                 found[name] = values
         known = vars(self)
-        if "apparent" in known:
-            found["sensors"] = self.apparent.value
-        return found | {key: known[key] for key in ("radar_name",) if key in known}
+        shown = self._shown
+        if shown is not None:
+            found["sensors"] = shown.value
+        if "radar_name" in known:
+            found["radar_name"] = self.radar_name
+        return found
 
     def facts(self) -> dict[str, str]:
         """Return the facts that were found, in words for people; nothing is read."""
-        if "apparent" not in vars(self) or self.apparent is Sensors.CAMERAS:
-            return {}
-        if self.apparent is Sensors.RADARS:
+        if self._shown is Sensors.RADARS:
             return {"images": "both are a radar's"}
+        if self._shown is not Sensors.DIFFERENT:
+            return {}
         facts = {"radar image": self.radar_name}
         radar = vars(self.radar)
         if "variation2" in radar:

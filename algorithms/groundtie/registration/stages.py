@@ -151,7 +151,7 @@ class Stages:
             check.points,
             self.masked.pair.grid,
             self.spec.tries,
-            factor if scene.sensors is Sensors.RADARS else None,
+            factor if scene.are_both_rough or scene.sensors is Sensors.RADARS else None,
             surveys,
             self._input_fit(estimate),
         )
