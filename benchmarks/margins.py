@@ -18,6 +18,7 @@ import numpy as np
 from groundtie.errors import GroundTieError
 from groundtie.geometry.judging import RIVAL_HEIGHT
 from groundtie.kinds import plain
+from groundtie.matching.locked import Sensors
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.survey import Survey
 from groundtie.matching.surveys import Rest
@@ -36,6 +37,7 @@ from groundtie.registration.rules.survey import (
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
+from groundtie.similarity.in_common import MOVED_GROUND_SHARE
 
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase
@@ -72,7 +74,7 @@ def _excess(survey: Survey) -> float:
 def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:
     """Return what is left without content that may be drawn; None: there is none."""
     rest = evidence.surveys.rest
-    return None if rest is None or not rest.is_evident else rest
+    return None if rest is None or not rest.shared.is_evident else rest
 
 
 def _of_survey(measure: Callable[[Survey], float]) -> Callable[[RegistrationEvidence], float]:
@@ -85,9 +87,10 @@ def _of_survey(measure: Callable[[Survey], float]) -> Callable[[RegistrationEvid
 def _rest_height(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     left = None if rest is None else rest.survey
-    if rest is None or left is None or (rest.is_explained and has_few_chips(left, rest.chips)):
+    if rest is None or left is None:
         return math.nan
-    return left.height
+    is_nothing = rest.shared.is_explained and has_few_chips(left, rest.chips)
+    return math.nan if is_nothing else left.height
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:
@@ -100,6 +103,22 @@ def _rest_peak(evidence: RegistrationEvidence) -> float:
 def _peak_beyond(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
+
+
+def _off_drawn(evidence: RegistrationEvidence) -> float:
+    """Return how far from what moves drawn content two cameras' images are moved."""
+    rest = _without_drawn(evidence)
+    if rest is None or rest.shared.sensors is not Sensors.CAMERAS:
+        return math.nan
+    return rest.shared.off_drawn
+
+
+def _moved_ground(evidence: RegistrationEvidence) -> float:
+    """Return how much of what is left varies alike, of images that are moved as ground is."""
+    rest = _without_drawn(evidence)
+    if rest is None or not rest.shared.moves_as_ground:
+        return math.nan
+    return rest.shared.sameness.ground
 
 
 def _height_of_else(evidence: RegistrationEvidence) -> float:
@@ -119,6 +138,8 @@ STATISTICS = (
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
     Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
+    Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
+    Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
     Statistic(
         "rest elsewhere: second peak",

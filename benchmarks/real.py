@@ -31,24 +31,39 @@ _WANTED_OF = 45
 
 @dataclass(frozen=True)
 class ShiftedCase:
-    """A real pair and the number of the shift that is drawn for it."""
+    """A real pair and the number of the shift that is drawn for it.
+
+    Parameters
+    ----------
+    case, number
+        Which.
+    largest_px
+        The shift at most.
+    tool
+        What registers it.
+    pixel_m
+        Pixel size at which the images are compared, of references of 1 m; None: as by default.
+    """
 
     case: RealCase
     number: int
     largest_px: float = LARGEST_SHIFT_PX
     tool: str = "coregister"
+    pixel_m: float | None = None
 
     def run(self, workers: int | None) -> Outcome:
         """Write the pair, register it and judge the result."""
         shift = draw_shift(self.case, self.largest_px, self.number)
+        is_coarse = self.pixel_m is not None
         with tempfile.TemporaryDirectory() as folder:
             return attempt(
                 f"{self.case.name} ({shift[0]:+.1f}, {shift[1]:+.1f})",
-                self.case.kind,
+                f"{self.case.kind}, {self.pixel_m:g} m" if is_coarse else self.case.kind,
                 write_case(self.case, shift, Path(folder)),
                 workers,
                 tool=self.tool,
                 search_radius=search_radius_m(self.largest_px),
+                **({"matching_pixel_size": self.pixel_m} if is_coarse else {}),
             )
 
 

@@ -29,6 +29,9 @@ SAR_SAR = "sar-sar"
 _TURNED = ("ss-ponds", "ss-meander")
 FREE = "without georeferencing"
 
+# The larger images are matched in pixels of four times as many looks, too.
+_MANY_LOOKS_M = 2.0
+
 # Masks of simulated pairs: the simulator's ground, homogeneous regions of the reference, none.
 _TRUE, _REGIONS, _NO_MASK = "true ground", "mask_regions", "no mask"
 MASKS = (_TRUE, _REGIONS, _NO_MASK)
@@ -102,6 +105,12 @@ def run(settings: Settings) -> SuiteResult:
         ),
         *(FreeCase(case, TOOL, FREE) for case in own if case.name in _TURNED),
     ]
+    many_looks: list[Case] = [
+        ShiftedCase(case, number, tool=TOOL, pixel_m=_MANY_LOOKS_M)
+        for case in own
+        for number in range(1 if settings.quick else SHIFTS)
+        if case.name in _TURNED
+    ]
     crossed = [
         Crossing(one.reference, one.input, TOOL)
         for one in crossings(every)
@@ -114,6 +123,7 @@ def run(settings: Settings) -> SuiteResult:
     ]
     outcomes = {
         "real": run_cases(real, settings.jobs),
+        "many looks": run_cases(many_looks, settings.jobs),
         "crossed": run_cases(
             crossed[:: max(len(crossed) // _QUICK_CROSSINGS, 1)] if settings.quick else crossed,
             settings.jobs,
@@ -135,6 +145,9 @@ def run(settings: Settings) -> SuiteResult:
         (
             *feature_counts.goals(detectors, chains, turns),
             *real_goals(outcomes["real"]),
+            none_wrong(
+                "Real pairs in pixels of many looks: silently wrong", outcomes["many looks"]
+            ),
             *other_goals(outcomes["crossed"], groups, outcomes["large"][0]),
         ),
         (
@@ -142,6 +155,7 @@ def run(settings: Settings) -> SuiteResult:
             feature_counts.chain_table(chains),
             feature_counts.turn_table(turns),
             accuracy_table("Real pairs", pairs),
+            accuracy_table("Real pairs in pixels of many looks", by_group(outcomes["many looks"])),
             accuracy_table("Simulated pairs", groups),
             _reasons(outcomes["simulated"]),
         ),

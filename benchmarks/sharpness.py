@@ -156,7 +156,7 @@ def _sameness(
         locked = find_locked_content(pair, truth, places, Sensors.CAMERAS, EXACT_PX, context)
     if locked is None:
         raise ValueError("the arrays do not lie on one another")
-    return locked.sameness
+    return locked.shared.sameness
 
 
 def bands_of_series(folder: Path) -> list[Bands]:

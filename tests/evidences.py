@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
+from groundtie.matching.locked import Sensors, SharedContent
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Rest, Surveys
@@ -25,6 +27,7 @@ from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
 from groundtie.registration.verdict import refusals
 from groundtie.sensor.adjustment import Control, adjust
+from groundtie.similarity.in_common import Sameness
 
 GRID = utm_grid(600, 500)
 
@@ -132,10 +135,25 @@ def survey(
     return Survey(GRID, centres, shifts, surfaces)
 
 
-def in_common(without_windows: float, without_edges: float) -> Rest:
-    """Return how high chips are without what two sensors' images have in common."""
-    left, other = (survey(height=each) for each in (without_windows, without_edges))
-    return Rest(left, chips=49, is_evident=False, without_edges=other)
+# How much is the same: of two grounds beneath something drawn, and of one sensor's views.
+DRAWN_OVER = Sameness(sharpness=1.0, area=0.4, reduced_area=0.5, coarse_area=0.5, ground=0.0)
+VIEWS = replace(DRAWN_OVER, ground=0.4)
+
+
+def leaving(left: Survey | None = None, sameness: Sameness = DRAWN_OVER, **more: Any) -> Rest:
+    """Return what 49 chips show of two cameras' images without what these have the same."""
+    return Rest(SharedContent(sameness, Sensors.CAMERAS), more.pop("chips", 49), left, **more)
+
+
+def in_common(sensors: Sensors, left: Survey, without_edges: Survey | None = None) -> Rest:
+    """Return what chips show without what two images have in common, if only a little."""
+    shared = SharedContent(replace(DRAWN_OVER, area=0.1), sensors)
+    return Rest(shared, 49, left, without_edges=without_edges)
+
+
+def left_of_two_sensors(*heights: float) -> Rest:
+    """Return how high chips are without windows that vary alike, and without edges."""
+    return in_common(Sensors.DIFFERENT, *(survey(height=height) for height in heights))
 
 
 def facts(

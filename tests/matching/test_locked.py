@@ -19,6 +19,7 @@ from groundtie.matching.locked import (
     EXACT_PX,
     LockedContent,
     Sensors,
+    SharedContent,
     find_locked_content,
 )
 from groundtie.matching.survey import survey_places
@@ -31,6 +32,7 @@ SIDE = 320
 
 # Shares that are the same of one sensor's views, the more, the coarser the pixels.
 OF_ONE_GROUND = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8, "ground": 0.4}
+ONE_GROUND = Sameness(sharpness=1.5, **OF_ONE_GROUND)
 
 
 def looked_at(
@@ -88,9 +90,9 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
     # The grid has rows from north to south and pixels of 10 m.
     model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
     locked = looked_at(tmp_path, reference, input, context, model)
-    assert locked is not None and locked.sameness.is_evident
+    assert locked is not None and locked.shared.sameness.is_evident
     assert lies_at(locked, offset)
-    assert locked.sameness.has_sharp_edges
+    assert locked.shared.sameness.has_sharp_edges
 
 
 @pytest.mark.parametrize("widths", [(4, 6), (4, 8), (1, 3)])
@@ -104,10 +106,11 @@ def test_lines_that_are_drawn_in_other_widths_are_found(
         for seed, place, width in zip((1, 2), (1, 9), widths, strict=True)
     )
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and locked.sameness.is_evident
-    assert locked.sameness.has_edges_beside and not locked.sameness.has_sharp_edges
-    assert locked.is_drawn
-    assert replace(locked, sameness=replace(locked.sameness, **OF_ONE_GROUND)).is_drawn
+    assert locked is not None and locked.shared.sameness.is_evident
+    assert locked.shared.sameness.has_edges_beside and not locked.shared.sameness.has_sharp_edges
+    assert locked.shared.is_drawn
+    alike = replace(locked.shared.sameness, **OF_ONE_GROUND)
+    assert replace(locked.shared, sameness=alike).is_drawn
 
 
 @pytest.mark.parametrize("off_m", [0.0, 5.0, 10.0, 15.0])
@@ -118,7 +121,7 @@ def test_edges_of_one_ground_lie_to_either_side(
     """Though a transform is one and a half pixels of 10 m wrong."""
     model = shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, sensed(1), sensed(2), context, model)
-    assert locked is not None and locked.sameness.beside < 0.3
+    assert locked is not None and locked.shared.sameness.beside < 0.3
 
 
 def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:
@@ -155,7 +158,9 @@ def test_lines_are_masked_in_any_colour_over_any_ground(
             image[row::20, :160] = colour * faint
             image[row::20, 160:] = colour
     locked = looked_at(tmp_path, *images, context)
-    assert locked is not None and locked.sameness.is_evident and not locked.is_explained
+    assert (
+        locked is not None and locked.shared.sameness.is_evident and not locked.shared.is_explained
+    )
     assert masked(tmp_path, locked)[60::20].mean() > 0.95
 
 
@@ -173,8 +178,8 @@ def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
         for seed, place in ((1, 1), (2, 9))
     )
     locked = looked_at(tmp_path, reference, input, context, sensors=Sensors.DIFFERENT)
-    assert locked is not None and locked.is_evident
-    assert not locked.sameness.has_sharp_edges and locked.sameness.has_seams
+    assert locked is not None and locked.shared.is_evident
+    assert not locked.shared.sameness.has_sharp_edges and locked.shared.sameness.has_seams
     mask = masked(tmp_path, locked)
     # Columns are counted from 20 on.
     assert mask[:, 104:116].mean() > 0.9 and mask[124:136].mean() > 0.9
@@ -195,7 +200,7 @@ def test_views_without_anything_drawn_have_none(
 ) -> None:
     """Noise blurs the edges of different sensors' views."""
     locked = looked_at(tmp_path, sensed(1, 0.8), -sensed(2, 0.8, place), context)
-    assert locked is not None and not locked.sameness.is_evident
+    assert locked is not None and not locked.shared.sameness.is_evident
 
 
 @pytest.mark.parametrize(
@@ -211,8 +216,8 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
     locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0), exact_px)
     assert locked is not None
     assert lies_at(locked, (7 if is_evident else 7 + off_m / 10, 3))
-    assert not locked.sameness.is_evident
-    assert locked.is_evident == is_evident
+    assert not locked.shared.sameness.is_evident
+    assert locked.shared.is_evident == is_evident
     # What is masked then is around edges, whatever they look like.
     assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
 
@@ -225,9 +230,10 @@ def test_clouds_in_other_colours_are_masked_where_the_transform_is_evidence(
     clouds = 3 * texture(SIDE, SIDE, 30)
     images = sensed(1) + clouds, sensed(2, place=9) - clouds
     locked = looked_at(tmp_path, *images, context)
-    assert locked is not None and locked.is_exact and locked.sameness.area < 0.1
+    assert locked is not None and locked.shared.is_exact and locked.shared.sameness.area < 0.1
     assert masked(tmp_path, locked).mean() > 0.8
-    assert masked(tmp_path, replace(locked, is_exact=False)).mean() < 0.2
+    at_any_place = replace(locked, shared=replace(locked.shared, is_exact=False))
+    assert masked(tmp_path, at_any_place).mean() < 0.2
 
 
 @pytest.mark.parametrize(
@@ -247,8 +253,8 @@ def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
     """Pixels of 10 m. Radar images of one ground vary alike where speckle has averaged out."""
     images, model = (sensed(1, 0.8), sensed(2, 0.8, place)), shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
-    assert locked is not None and locked.is_exact == is_exact
-    assert locked.sameness.varies_as_ground == (place == 1)
+    assert locked is not None and locked.shared.is_exact == is_exact
+    assert locked.shared.sameness.varies_as_ground == (place == 1)
 
 
 @pytest.mark.parametrize(
@@ -265,42 +271,49 @@ def test_ground_varies_alike_or_follows_in_other_colours(
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
     """Most windows vary alike; so do those of reduced images where single pixels do not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None and locked.sameness.area > 0.5
-    assert locked.is_explained
+    assert locked is not None and locked.shared.sameness.area > 0.5
+    assert locked.shared.is_explained
 
 
 @pytest.mark.parametrize(("coarse", "is_view"), [(0.66, True), (0.6, False)])
-def test_views_are_a_little_less_alike_in_coarser_pixels(
-    tmp_path: Path, context: Context, coarse: float, is_view: bool
-) -> None:
+def test_views_are_a_little_less_alike_in_coarser_pixels(coarse: float, is_view: bool) -> None:
     """Light and seasons differ over wide areas; two radar images have neither."""
-    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None
-    sameness = replace(locked.sameness, sharpness=1.5, related=0.0, **OF_ONE_GROUND)
-    sameness = replace(sameness, coarse_area=coarse)
-    assert replace(locked, sameness=sameness).is_explained == is_view
+    sameness = replace(ONE_GROUND, coarse_area=coarse)
+    assert SharedContent(sameness, Sensors.CAMERAS).is_explained == is_view
     assert sameness.is_finer_than_ground and not sameness.varies_as_ground
 
 
-def test_what_varies_alike_in_two_radar_images_is_no_ground(
-    tmp_path: Path, context: Context
-) -> None:
+@pytest.mark.parametrize("sensors", Sensors)
+def test_what_varies_alike_in_two_radar_images_is_no_ground(sensors: Sensors) -> None:
     """Each view of a radar has speckle of its own."""
-    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None
-    views = replace(locked.sameness, sharpness=1.5, **OF_ONE_GROUND)
-    for sensors in Sensors:
-        found = replace(locked, sameness=views, sensors=sensors)
-        assert found.is_explained == (sensors is Sensors.CAMERAS)
+    assert SharedContent(ONE_GROUND, sensors).is_explained == (sensors is Sensors.CAMERAS)
 
 
-def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
-    tmp_path: Path, context: Context
+@pytest.mark.parametrize(
+    ("shares", "is_evident"),
+    [
+        ({}, False),
+        ({"ground": 0.1}, True),
+        ({"coarse_area": 0.6}, True),
+        ({"sharpness": 3.0}, True),
+        ({"step_width": 0.2}, True),
+        ({"ground": 0.1, "related": 0.7}, True),
+        ({"area": 0.8}, True),
+    ],
+)
+def test_one_ground_in_pixels_of_many_looks_is_nothing_drawn(
+    shares: dict[str, float], is_evident: bool
 ) -> None:
-    locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
-    assert locked is not None
+    """But it is if hardly anything is left, and of two sensors' views, which differ."""
+    sameness = replace(ONE_GROUND, **shares)
+    assert sameness.is_evident
+    assert SharedContent(sameness, Sensors.RADARS).is_evident == is_evident
+    assert SharedContent(sameness, Sensors.DIFFERENT).is_evident
+
+
+def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground() -> None:
     # As of one exposure's bands.
-    views = replace(locked.sameness, sharpness=4.2, **OF_ONE_GROUND)
+    views = replace(ONE_GROUND, sharpness=4.2)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
     copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)
@@ -312,35 +325,84 @@ def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground(
     ("sharpness", "related", "is_drawn"), [(2.8, 0.0, False), (3.0, 0.0, True), (3.0, 0.8, False)]
 )
 def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(
-    tmp_path: Path, context: Context, sharpness: float, related: float, is_drawn: bool
+    sharpness: float, related: float, is_drawn: bool
 ) -> None:
-    locked = looked_at(tmp_path, sensed(1), sensed(2, place=9), context)
-    assert locked is not None
-    sameness = replace(locked.sameness, sharpness=sharpness, related=related, ground=0.0)
-    assert replace(locked, sameness=sameness).is_drawn == is_drawn
+    sameness = replace(ONE_GROUND, sharpness=sharpness, related=related, ground=0.0)
+    assert SharedContent(sameness, Sensors.CAMERAS).is_drawn == is_drawn
+
+
+@pytest.mark.parametrize(
+    ("offset", "is_moved"),
+    [
+        ((0.0, 1.4), False),
+        ((0.0, 1.6), True),
+        ((6.2, 3.0), False),
+        ((6.2, 3.3), True),
+        ((6.3, 3.0), True),
+    ],
+)
+@pytest.mark.slow
+def test_what_is_drawn_moves_by_whole_pixels_or_hardly_at_all(
+    tmp_path: Path, context: Context, offset: tuple[float, float], is_moved: bool
+) -> None:
+    """Pixels of 10 m. What a radar shows is no evidence of either."""
+    model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
+    images = sensed(1), sensed(2, place=9)
+    for sensors in Sensors:
+        locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
+        assert locked is not None
+        assert locked.shared.moves_as_ground == (is_moved and sensors is Sensors.CAMERAS)
+
+
+@pytest.mark.parametrize(
+    ("ground", "beside", "off_drawn", "is_explained", "is_drawn"),
+    [
+        (0.20, 0.0, 0.9, False, True),
+        (0.20, 0.0, 1.1, True, False),
+        (0.20, 1.5, 1.1, True, True),
+        (0.12, 0.0, 1.1, False, True),
+    ],
+)
+def test_views_that_move_as_ground_may_have_sharp_edges_and_leave_little(
+    ground: float, beside: float, off_drawn: float, is_explained: bool, is_drawn: bool
+) -> None:
+    sameness = replace(ONE_GROUND, sharpness=8.0, ground=ground, beside=beside)
+    shared = SharedContent(sameness, Sensors.CAMERAS, off_drawn=off_drawn)
+    assert shared.is_explained == is_explained and shared.is_drawn == is_drawn
+    assert shared.may_hide_ground == (off_drawn < 1)
+
+
+@pytest.mark.parametrize("sensors", Sensors)
+@pytest.mark.parametrize("off_drawn", [0.9, 1.1])
+def test_a_little_that_is_the_same_may_be_drawn_where_it_moves_so(
+    sensors: Sensors, off_drawn: float
+) -> None:
+    """Cameras' images alone show whether it does."""
+    shared = SharedContent(replace(ONE_GROUND, area=0.1, ground=0.0), sensors, off_drawn=off_drawn)
+    assert shared.may_be_drawn == (off_drawn < 1 or sensors is not Sensors.CAMERAS)
 
 
 def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:
     locked = looked_at(tmp_path, sensed(1), sensed(1), context)
-    assert locked is not None and locked.sameness.area > 0.99
-    assert locked.is_explained
-    assert replace(locked, sensors=Sensors.RADARS).is_explained
-    assert not replace(locked, sensors=Sensors.DIFFERENT).is_explained
-    assert not locked.sameness.is_finer_than_ground
+    assert locked is not None and locked.shared.sameness.area > 0.99
+    assert locked.shared.is_explained
+    assert replace(locked.shared, sensors=Sensors.RADARS).is_explained
+    assert not replace(locked.shared, sensors=Sensors.DIFFERENT).is_explained
+    assert not locked.shared.sameness.is_finer_than_ground
 
 
 @pytest.mark.slow
 def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) -> None:
     """Its edges are as sharp as a drawing's, but everywhere."""
     copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)
-    assert copy is not None and copy.sameness.sharpness > 5
-    assert not copy.is_drawn
+    assert copy is not None and copy.shared.sameness.sharpness > 5
+    assert not copy.shared.is_drawn
     # All of it follows in other colours, and must not be hidden; edges are.
-    assert copy.is_exact and masked(tmp_path, copy).mean() < 0.95
+    assert copy.shared.is_exact and masked(tmp_path, copy).mean() < 0.95
     drawn = drawn_into(sensed(1)), -drawn_into(sensed(2, place=9))
     locked = looked_at(tmp_path, *drawn, context)
-    assert locked is not None and locked.sameness.sharpness > 5
-    assert locked.is_drawn
+    assert locked is not None and locked.shared.sameness.sharpness > 5
+    assert locked.shared.is_drawn
 
 
 @pytest.mark.parametrize(("blur_px", "strength"), [(0.1, 2.0), (2.0, 1.0), (2.0, 2.0)])
@@ -353,8 +415,8 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
     pattern *= strength / pattern.std()
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and locked.sameness.is_evident
-    assert locked.sameness.is_finer_than_ground and not locked.is_explained
+    assert locked is not None and locked.shared.sameness.is_evident
+    assert locked.shared.sameness.is_finer_than_ground and not locked.shared.is_explained
 
 
 def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:
@@ -364,9 +426,9 @@ def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Con
     pattern += rng.normal(size=(SIDE, 1)) + rng.normal(size=(1, SIDE))
     reference, input = sensed(1, 0.1) + pattern, sensed(2, 0.1, place=9) + pattern
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and locked.sameness.is_evident
-    assert locked.sameness.reduced_area < locked.sameness.area
-    assert not locked.is_explained
+    assert locked is not None and locked.shared.sameness.is_evident
+    assert locked.shared.sameness.reduced_area < locked.shared.sameness.area
+    assert not locked.shared.is_explained
 
 
 def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -> None:
@@ -375,9 +437,9 @@ def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -
     speckled = (np.random.default_rng(n).exponential(3.0, holes.shape) for n in (1, 2))
     reference, input = (np.where(holes, -3.0, values) for values in speckled)
     locked = looked_at(tmp_path, reference, input, context)
-    assert locked is not None and 0.4 < locked.sameness.area < 0.6
-    assert locked.sameness.is_evident
-    assert not locked.is_explained
+    assert locked is not None and 0.4 < locked.shared.sameness.area < 0.6
+    assert locked.shared.sameness.is_evident
+    assert not locked.shared.is_explained
 
 
 @contextmanager
@@ -422,8 +484,8 @@ def test_lines_that_are_drawn_on_the_map_are_found_on_another_grid(
     model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
     with on_grids(tmp_path, reference, seen, place) as pair:
         locked = found_in(pair, model, context)
-        assert locked is not None and locked.sameness.is_evident
-        assert locked.sameness.has_sharp_edges and not locked.is_exact
+        assert locked is not None and locked.shared.sameness.is_evident
+        assert locked.shared.sameness.has_sharp_edges and not locked.shared.is_exact
 
 
 @pytest.mark.slow
@@ -443,7 +505,9 @@ def test_lines_at_the_same_columns_and_rows_are_found_whatever_pixels_are_nomina
     )
     with on_grids(tmp_path, reference, input, place) as pair:
         locked = found_in(pair, stretched, context)
-        assert locked is not None and locked.is_exact and locked.sameness.has_sharp_edges
+        assert (
+            locked is not None and locked.shared.is_exact and locked.shared.sameness.has_sharp_edges
+        )
         assert lies_at(locked, (0, 0))
 
 
@@ -460,7 +524,7 @@ def test_arrays_are_not_the_same_where_a_transform_has_them_elsewhere(
     place = utm_grid(SIDE, SIDE).scaled(side_m / 10.0).transform
     with on_grids(tmp_path, sensed(1), sensed(1), place) as pair:
         locked = found_in(pair, model, context)
-        assert locked is not None and not locked.is_evident
+        assert locked is not None and not locked.shared.is_evident
 
 
 class OfASensor(Grid):

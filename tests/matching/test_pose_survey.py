@@ -51,7 +51,7 @@ def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> N
     assert survey is not None and survey.confirming > 0.9 * len(found.agrees)
     assert found.surveys.parts == []
     rest = found.surveys.rest
-    assert rest is not None and not rest.is_evident
+    assert rest is not None and not rest.shared.is_evident
 
 
 @pytest.mark.slow

@@ -24,6 +24,8 @@ from evidences import (
     fallen,
     fit_points,
     in_common,
+    leaving,
+    left_of_two_sensors,
     points,
     refinement,
     refusing,
@@ -45,7 +47,7 @@ from groundtie.errors import (
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.used import GROUND, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
-from groundtie.matching.surveys import Rest
+from groundtie.matching.locked import Sensors
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules
@@ -213,24 +215,24 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(height=2.1, rival=1.0)),
     ),
     "pixel-locked content": (
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=1.9, rival=1.0))),
-        evidence(GOOD, survey=survey(), rest=Rest(survey(height=2.1, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=leaving(survey(height=1.9, rival=1.0))),
+        evidence(GOOD, survey=survey(), rest=leaving(survey(height=2.1, rival=1.0))),
     ),
     "rest elsewhere": (
         evidence(
             GOOD,
             survey=survey(),
-            rest=Rest(survey(part=5, rival=7.0), chips=49, is_evident=False),
+            rest=in_common(Sensors.RADARS, survey(part=5, rival=7.0)),
         ),
         evidence(
             GOOD,
             survey=survey(),
-            rest=Rest(survey(part=5, rival=5.0), chips=49, is_evident=False),
+            rest=in_common(Sensors.RADARS, survey(part=5, rival=5.0)),
         ),
     ),
     "nothing else in common": (
-        evidence(GOOD, survey=survey(), rest=in_common(0.9, 0.8)),
-        evidence(GOOD, survey=survey(), rest=in_common(0.8, 1.1)),
+        evidence(GOOD, survey=survey(), rest=left_of_two_sensors(0.9, 0.8)),
+        evidence(GOOD, survey=survey(), rest=left_of_two_sensors(0.8, 1.1)),
     ),
     "ground elsewhere": (
         evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.7)),

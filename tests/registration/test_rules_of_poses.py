@@ -16,6 +16,7 @@ from evidences import (
     facts,
     fallen,
     fit_points,
+    leaving,
     refusing,
     scatter,
     scene,
@@ -86,7 +87,7 @@ def test_poses_of_bands_that_are_displaced_are_refused(
         (7, survey(38, part=11), None, ["part elsewhere"]),
         (7, survey(height=4.0, rival=3.5), None, ["second place nearby"]),
         (7, survey(height=1.9, rival=0.5), None, ["weak similarity"]),
-        (7, survey(), Rest(survey(height=1.9, rival=1.0)), ["pixel-locked content"]),
+        (7, survey(), leaving(survey(height=1.9, rival=1.0)), ["pixel-locked content"]),
     ],
 )
 def test_rules_of_registrations_judge_poses(

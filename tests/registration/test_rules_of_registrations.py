@@ -9,15 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 from evidences import (
+    DRAWN_OVER,
     GOOD,
     PERHAPS,
     RANGE,
+    VIEWS,
     displaced,
     estimated,
     evidence,
     facts,
     fit_points,
     in_common,
+    leaving,
+    left_of_two_sensors,
     masked,
     refusing,
     scatter,
@@ -29,11 +33,12 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
+from groundtie.matching.locked import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
-from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
+from groundtie.similarity.in_common import Sameness
 
 
 def test_what_heights_may_displace_all_points_by_is_refused() -> None:
@@ -159,25 +164,26 @@ def test_parts_are_chips_that_do_not_confirm_between_others_that_do() -> None:
 
 
 def test_without_locked_content_the_place_must_match() -> None:
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(20, height=1.9, rival=1.0)))
+    found = evidence(GOOD, survey=survey(), rest=leaving(survey(20, height=1.9, rival=1.0)))
     assert refusing(found) == ["pixel-locked content"]
 
 
 def test_without_locked_content_another_place_must_not_match_better() -> None:
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(20, height=4.0, rival=5.0)))
+    found = evidence(GOOD, survey=survey(), rest=leaving(survey(20, height=4.0, rival=5.0)))
     assert refusing(found) == ["pixel-locked content"]
 
 
 def test_of_what_is_drawn_nothing_that_is_left_is_evidence() -> None:
     """Soft rims of it match, too: no survey of them is made, however high the whole one is."""
-    found = evidence(GOOD, survey=survey(height=20.0), rest=Rest())
+    rest = leaving(sameness=replace(DRAWN_OVER, sharpness=3.0))
+    found = evidence(GOOD, survey=survey(height=20.0), rest=rest)
     assert refusing(found) == ["pixel-locked content"]
 
 
 @pytest.mark.parametrize(("chips", "is_refused"), [(200, True), (190, False)])
 def test_a_quarter_of_the_chips_must_be_left_to_confirm(chips: int, is_refused: bool) -> None:
     """Few are high by chance; 49 are left."""
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(49), chips=chips))
+    found = evidence(GOOD, survey=survey(), rest=leaving(survey(49), chips=chips))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
@@ -185,7 +191,8 @@ def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
     """Tall buildings do, whose layover differs."""
     left = survey(3, part=5, height=6.0)
     assert left.parts
-    assert refusing(evidence(GOOD, survey=survey(), rest=Rest(left, True, survey()))) == []
+    rest = leaving(left, VIEWS, beyond=survey())
+    assert refusing(evidence(GOOD, survey=survey(), rest=rest)) == []
 
 
 @pytest.mark.parametrize(
@@ -198,7 +205,7 @@ def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
     """Walls are a second place, canopies are parts: what is drawn over ground leaves both."""
     left = survey(part=part, height=height, rival=rival)
     left.surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = 6.0
-    found = evidence(GOOD, survey=survey(), rest=Rest(left, chips=49, is_evident=False))
+    found = evidence(GOOD, survey=survey(), rest=in_common(Sensors.RADARS, left))
     assert refusing(found) == ["rest elsewhere"] * is_refused
 
 
@@ -207,15 +214,16 @@ def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
     [
         ((0.9, 0.9), {}, True),
         ((1.1, 0.9), {}, False),
+        ((1.1,), {}, False),
         ((0.9, 1.1), {}, False),
         ((0.9, 0.9), {"mask": masked(GROUND)}, False),
     ],
 )
 def test_what_two_sensors_have_in_common_is_not_all_that_matches(
-    heights: tuple[float, float], masks: dict[str, MaskUsed], is_refused: bool
+    heights: tuple[float, ...], masks: dict[str, MaskUsed], is_refused: bool
 ) -> None:
     """What they leave without windows or edges; a town's ground is not asked."""
-    found = evidence(GOOD, survey=survey(), rest=in_common(*heights), **masks)
+    found = evidence(GOOD, survey=survey(), rest=left_of_two_sensors(*heights), **masks)
     assert refusing(found) == ["nothing else in common"] * is_refused
 
 
@@ -227,7 +235,7 @@ def test_a_quarter_of_the_chips_that_copies_leave_must_show_something(
     chips: int, height: float, is_refused: bool
 ) -> None:
     """Beneath one cloud deck over two grounds they match nowhere; a plain copy leaves few."""
-    rest = Rest(survey(height=height, rival=0.2), True, None, chips)
+    rest = leaving(survey(height=height, rival=0.2), VIEWS, chips=chips)
     found = evidence(GOOD, survey=survey(), rest=rest)
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
@@ -242,14 +250,14 @@ def test_a_second_peak_is_other_ground_however_high_the_first_is(
     assert refusing(found) == ["second place nearby"] * is_refused
 
 
-@pytest.mark.parametrize("is_explained", [False, True])
+@pytest.mark.parametrize("sameness", [DRAWN_OVER, VIEWS])
 @pytest.mark.parametrize(("peak", "is_refused"), [(5.9 / 7, False), (6.1 / 7, True)])
 def test_what_is_left_must_have_no_second_peak(
-    peak: float, is_refused: bool, is_explained: bool
+    peak: float, is_refused: bool, sameness: Sameness
 ) -> None:
     for rest in (
-        Rest(survey(peak=peak), is_explained),
-        Rest(None, True, survey(height=1.7, rival=0.0, peak=peak)),
+        leaving(survey(peak=peak), sameness),
+        leaving(None, VIEWS, beyond=survey(height=1.7, rival=0.0, peak=peak)),
     ):
         found = evidence(GOOD, survey=survey(), rest=rest)
         assert refusing(found) == ["pixel-locked content"] * is_refused
@@ -275,7 +283,7 @@ def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
-    found = evidence(GOOD, survey=survey(), rest=Rest(survey(height=6.0), True, left))
+    found = evidence(GOOD, survey=survey(), rest=leaving(survey(height=6.0), VIEWS, beyond=left))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 

@@ -40,6 +40,11 @@ _NEAR_PX = 1.5
 # refused, but some beyond 0.09, and one of the suite series at 0.08.
 EXACT_PX = 0.0625
 
+# Where what is drawn deceives, transforms lie within so many times of what counts as exact of whole
+# pixels of the array, or within the second of what is nominal: nearly all of two cameras' images;
+# right transforms of ground that is displaced seldom do (suite margins).
+WHOLE_TIMES_EXACT, NOMINAL_PX = 4, 1.5
+
 # Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
 _EDGE_SURROUNDINGS_PX = 9
 _SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
@@ -57,6 +62,82 @@ class Sensors(Enum):
 
 
 @dataclass(frozen=True)
+class SharedContent:
+    """What images have the same where a transform has them, and what it may be.
+
+    Parameters
+    ----------
+    sameness
+        How much.
+    sensors
+        What the images may be.
+    is_exact
+        Whether the transform moves the array by whole pixels all over, whatever is nominal.
+        Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
+        one ground vary alike where it has averaged out: those that do not count as exact.
+    off_drawn
+        How far the transform is from those that move what is drawn: by whole pixels of the array,
+        or hardly at all on the map. Up to 1, it may be one of them.
+    """
+
+    sameness: Sameness
+    sensors: Sensors
+    is_exact: bool = False
+    off_drawn: float = 0.0
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether more is the same than two views show of one ground, or lies too exactly so.
+
+        Two radar images of one ground vary alike where speckle has averaged out, as in pixels of
+        many looks.
+        """
+        same = self.sameness
+        has_one_ground = same.has_one_ground and not same.covers_most
+        is_ground = self.sensors is Sensors.RADARS and has_one_ground
+        return self.is_exact or same.is_marked or (same.covers_much and not is_ground)
+
+    @property
+    def moves_as_ground(self) -> bool:
+        """Whether the transform moves cameras' images as nothing drawn is moved."""
+        return self.sensors is Sensors.CAMERAS and self.off_drawn > 1
+
+    @property
+    def may_be_drawn(self) -> bool:
+        """Whether what is the same may be all that matches, though no more than of one ground."""
+        covers_some = self.sameness.covers_some
+        return covers_some and not (self.is_explained or self.moves_as_ground)
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the images are copies, or one camera's views of one ground.
+
+        What is left of them need not confirm the transform: copies leave nothing, and what a camera
+        shows alike is most of what it shows. Each view of a radar has speckle of its own.
+        """
+        if self.sensors is Sensors.DIFFERENT:
+            return False
+        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
+        is_moved = self.moves_as_ground and self.sameness.leaves_ground
+        return is_view or is_moved or self.sameness.is_copy
+
+    @property
+    def may_hide_ground(self) -> bool:
+        """Whether what is explained may be drawn all the same, by its edges and place."""
+        return self.sameness.has_sharp_edges and not self.moves_as_ground
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its edges are not those of one ground.
+
+        They lie beside one another; or they are sharper, of what is no copy or view.
+        """
+        same = self.sameness
+        is_image = self.is_explained or same.is_copy_in_other_colours
+        return same.has_edges_beside or (same.has_sharp_edges and not is_image)
+
+
+@dataclass(frozen=True)
 class LockedContent:
     """Which pixels of the reference the input repeats where both are drawn alike.
 
@@ -69,53 +150,13 @@ class LockedContent:
     to_input
         Takes map positions to where the input has what is drawn there, in its pixels: where the
         transform has them, or the whole number of columns and rows off that it moves the array by.
-    sameness
-        How much they have the same.
-    sensors
-        What the images may be.
-    is_exact
-        Whether the transform moves the array by whole pixels all over, whatever is nominal.
-        Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
-        one ground vary alike where it has averaged out: those that do not count as exact.
+    shared
+        What they have the same.
     """
 
     pair: ImagePair
     to_input: PointFunction
-    sameness: Sameness
-    sensors: Sensors
-    is_exact: bool
-
-    @property
-    def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground, or lies too exactly so."""
-        return self.sameness.is_evident or self.is_exact
-
-    @property
-    def may_be_drawn(self) -> bool:
-        """Whether what is the same may be all that matches, though no more than of one ground."""
-        return self.sameness.covers_some and not self.is_explained
-
-    @property
-    def is_explained(self) -> bool:
-        """Whether the images are copies, or one camera's views of one ground.
-
-        What is left of them need not confirm the transform: copies leave nothing, and what a camera
-        shows alike is most of what it shows. Each view of a radar has speckle of its own.
-        """
-        if self.sensors is Sensors.DIFFERENT:
-            return False
-        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
-        return is_view or self.sameness.is_copy
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether its edges are not those of one ground.
-
-        They lie beside one another; or they are sharper, of what is no copy or view.
-        """
-        same = self.sameness
-        is_image = self.is_explained or same.is_copy_in_other_colours
-        return same.has_edges_beside or (same.has_sharp_edges and not is_image)
+    shared: SharedContent
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
@@ -127,14 +168,14 @@ class LockedContent:
         """
         patches = self._around(piece)
         windows = Windows.of(*patches)
-        same = windows.same
-        if not self.is_explained:
-            if self.is_exact and not self.sameness.is_copy_in_other_colours:
+        same, shared = windows.same, self.shared
+        if not shared.is_explained:
+            if shared.is_exact and not shared.sameness.is_copy_in_other_colours:
                 same = same | windows.related
             same = covered(same, WINDOW_PX)
-            if self.sameness.has_sharp_edges or self.is_exact:
+            if shared.sameness.has_sharp_edges or shared.is_exact:
                 same |= covered(drawn_edges(*patches), _EDGE_SURROUNDINGS_PX)
-            if self.sameness.has_seams:
+            if shared.sameness.has_seams:
                 same |= covered(seams(*patches), _SEAM_SURROUNDINGS_PX)
         return _inner(same)
 
@@ -205,7 +246,10 @@ def find_locked_content(
         is_exact = is_near and not sameness.varies_as_ground
     else:
         is_exact = off_px <= exact_px
-    return LockedContent(pair, to_input, sameness, sensors, is_exact)
+    off_nominal = _off_nominal_px(pair.grid, transform) / NOMINAL_PX
+    off_drawn = min(off_px / (WHOLE_TIMES_EXACT * exact_px), off_nominal)
+    shared = SharedContent(sameness, sensors, is_exact, off_drawn)
+    return LockedContent(pair, to_input, shared)
 
 
 def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFunction, float]:
@@ -219,3 +263,9 @@ def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFuncti
     offset = np.rint(np.median(found - there, axis=0))
     off_px = float(np.abs(found - there - offset).max())
     return lambda xy: reference.map_to_pixel(xy) + offset, off_px
+
+
+def _off_nominal_px(grid: Grid, transform: Transform) -> float:
+    """Return how far at most a transform is from what is nominal, in pixels of a grid."""
+    px = grid.lattice()
+    return float(np.abs(grid.map_to_pixel(transform.model(grid.pixel_to_map(px))) - px).max())

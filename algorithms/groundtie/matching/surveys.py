@@ -10,10 +10,15 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import Sensors, find_locked_content
+from .locked import Sensors, SharedContent, find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
 from .survey import Survey, survey_model, survey_places
+
+# Of images that are no two radars' or one camera's, windows that vary alike, and edges that
+# coincide, are little of what matches. Without the ones or the others, right transforms leave 1.1
+# and more (suite real), what is drawn over other ground mostly up to 0.8.
+LEAST_OF_REST = 1.0
 
 
 @dataclass(frozen=True)
@@ -22,34 +27,26 @@ class Rest:
 
     Parameters
     ----------
+    shared
+        That content.
+    chips
+        How many chips there are; of some too little may be left.
     survey
         What they show; None: it is not asked, as of content that is drawn, and of copies and views
-        whose edges do not coincide sharply.
-    is_explained
-        Whether such content needs no confirmation (see `LockedContent`).
+        that hide nothing.
     beyond
         What they show beyond what the reference explains of the input, where it is explained;
         None elsewhere.
-    chips
-        How many chips there are; of some too little may be left.
-    is_evident
-        Whether there is more of such content than two views of one ground have in common.
     without_edges
-        What they show without the surroundings of edges that coincide, of images in which no such
-        content is evident; None: of two radars, and where it is evident.
+        What they show without the surroundings of edges that coincide, where no such content is
+        evident and hardly anything is left of other images than two radars'; None elsewhere.
     """
 
+    shared: SharedContent
+    chips: int
     survey: Survey | None = None
-    is_explained: bool = False
     beyond: Survey | None = None
-    chips: int = 0
-    is_evident: bool = True
     without_edges: Survey | None = None
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether such content is drawn over the images: unexplained, and nothing is asked."""
-        return self.survey is None and not self.is_explained
 
 
 @dataclass(frozen=True)
@@ -142,8 +139,10 @@ def survey_rest(
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     elsewhere_px, exact_px = accuracy_px
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
-    is_speckled = sensors is Sensors.RADARS
-    if locked is None or not (locked.is_evident or locked.may_be_drawn or is_speckled):
+    if locked is None:
+        return None
+    shared, are_radars = locked.shared, sensors is Sensors.RADARS
+    if not (shared.is_evident or shared.may_be_drawn or are_radars):
         return None
     # What a mask leaves is little: one measure alone would miss most of it.
     fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
@@ -153,18 +152,18 @@ def survey_rest(
     def left_without(mask: MaskOf) -> Survey:
         return survey_model(fused, transform.model, places, elsewhere_px, once, mask)
 
-    if not locked.is_evident:
-        without_edges = None if is_speckled else left_without(locked.around_edges)
-        return Rest(
-            left_without(locked), chips=chips, is_evident=False, without_edges=without_edges
-        )
-    if locked.is_drawn:
-        return Rest()
-    left = beyond = None
-    if not locked.is_explained or locked.sameness.has_sharp_edges:
+    if not shared.is_evident:
         left = left_without(locked)
-    if locked.is_explained:
+        is_low = left.height < LEAST_OF_REST and not are_radars
+        without_edges = left_without(locked.around_edges) if is_low else None
+        return Rest(shared, chips, left, without_edges=without_edges)
+    if shared.is_drawn:
+        return Rest(shared, chips)
+    seen = beyond = None
+    if not shared.is_explained or shared.may_hide_ground:
+        seen = left_without(locked)
+    if shared.is_explained:
         # A copy may be blended into other ground, of which the same windows are no part.
         other = replace(fused, left_of=unexplained)
         beyond = survey_model(other, transform.model, places, elsewhere_px, context)
-    return Rest(left, locked.is_explained, beyond, chips)
+    return Rest(shared, chips, seen, beyond)

@@ -71,6 +71,11 @@ _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
+# Where a transform has what is the same lie as nothing drawn does, less shows one ground. Suite
+# margins: of right transforms 19 % and more, where an image is no noisy copy of the other; above
+# what was drawn so on purpose up to 12 %, but for clouds, which are as smooth as ground.
+MOVED_GROUND_SHARE = 0.15
+
 # Pixels of reduced images are means of at least this share of theirs.
 _LEAST_VALID = 0.25
 
@@ -115,9 +120,23 @@ class Sameness:
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground."""
-        has_edges = self.has_sharp_edges or self.has_edges_beside
-        return has_edges or self.area >= _LEAST_AREA or self.has_seams
+        """Whether more is the same than two sensors' views show of one ground."""
+        return self.is_marked or self.covers_much
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether edges or seams are not those of ground."""
+        return self.has_sharp_edges or self.has_edges_beside or self.has_seams
+
+    @property
+    def covers_much(self) -> bool:
+        """Whether more varies alike than in two sensors' views of one ground."""
+        return self.area >= _LEAST_AREA
+
+    @property
+    def covers_most(self) -> bool:
+        """Whether so much varies alike that hardly anything is left."""
+        return self.area >= _COPY_SHARE
 
     @property
     def covers_some(self) -> bool:
@@ -172,13 +191,19 @@ class Sameness:
         return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
-    def varies_as_ground(self) -> bool:
-        """Whether as much as of one ground varies alike, or follows in other colours.
+    def leaves_ground(self) -> bool:
+        """Whether what is not the same varies alike, too, if only a little."""
+        return self.ground >= MOVED_GROUND_SHARE
 
-        What is not the same varies alike, too, as one sensor's views of one ground.
-        """
-        has_one_ground = self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
-        return has_one_ground or self.related >= _GROUND_SHARE
+    @property
+    def varies_as_ground(self) -> bool:
+        """Whether as much as of one ground varies alike, or follows in other colours."""
+        return self.has_one_ground or self.related >= _GROUND_SHARE
+
+    @property
+    def has_one_ground(self) -> bool:
+        """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
+        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
 _NO_WINDOWS = np.zeros((4, 3), int)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 from ...geometry.judging import RIVAL_HEIGHT
+from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT, Sensors
 from ...matching.parts import LEAST_EXCESS
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ...matching.surveys import Rest
+from ...matching.surveys import LEAST_OF_REST, Rest
+from ...similarity.in_common import MOVED_GROUND_SHARE
 from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
@@ -34,12 +36,6 @@ _LEAST_CHIPS = 0.25
 # 14.3); others from 6.5 on (suites real, calibration of large rural scenes, seeds 440-565, and
 # attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
-
-
-# Of images that are no views of one sensor's, windows that vary alike, and edges that coincide, are
-# little of what matches. Without the ones or the others, right transforms leave 1.1 and more (suite
-# real), what is drawn over other ground mostly up to 0.8.
-LEAST_OF_REST = 1.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -105,7 +101,7 @@ def deviations_beyond(rest: Rest) -> float:
 
 def _confirms(left: Survey, rest: Rest) -> bool:
     if has_few_chips(left, rest.chips):
-        return rest.is_explained
+        return rest.shared.is_explained
     is_elsewhere = _has_rival(left) or deviations_elsewhere(left) >= REST_PEAK_DEVIATIONS
     return left.height >= WEAK_HEIGHT and not is_elsewhere
 
@@ -113,9 +109,9 @@ def _confirms(left: Survey, rest: Rest) -> bool:
 def _locked(evidence: RegistrationEvidence) -> str | None:
     """Ask of what is left what is asked of all; of copies and one camera's views it is little."""
     rest = evidence.surveys.rest
-    if rest is None or not rest.is_evident:
+    if rest is None or not rest.shared.is_evident:
         return None
-    if rest.is_drawn:
+    if rest.shared.is_drawn:
         return "both images show the same drawn edges, sharper than ground's or beside one another"
     if deviations_beyond(rest) >= REST_PEAK_DEVIATIONS:
         return "what the reference does not explain of the input matches elsewhere"
@@ -133,7 +129,7 @@ def deviations_of_rest(rest: Rest | None) -> float:
 
     0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
     """
-    if rest is None or rest.is_evident or rest.without_edges is not None:
+    if rest is None or rest.shared.is_evident or rest.shared.sensors is not Sensors.RADARS:
         return 0.0
     left = rest.survey
     if left is None or not (_has_rival(left) and left.parts):
@@ -148,13 +144,14 @@ def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 
 def height_of_else(rest: Rest | None) -> float:
-    """Return how high chips are without what two sensors' images have in common.
+    """Return how high chips are without what images other than two radars' have in common.
 
     Without windows or edges, whichever is higher; infinite where it was not asked.
     """
-    if rest is None or rest.survey is None or rest.without_edges is None:
+    if rest is None or rest.shared.is_evident or rest.shared.sensors is Sensors.RADARS:
         return math.inf
-    return max(rest.survey.height, rest.without_edges.height)
+    heights = [left.height for left in (rest.survey, rest.without_edges) if left is not None]
+    return max(heights, default=math.inf)
 
 
 def _nothing_else(evidence: RegistrationEvidence) -> str | None:
@@ -216,7 +213,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
         f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, a quarter is left "
         "that is below that or has such a place, or what the reference does not explain of it has "
-        "one",
+        "one; but cameras' images that are displaced as ground is, by more than "
+        f"{NOMINAL_PX:g} px on the map and by no whole pixels to {WHOLE_TIMES_EXACT * EXACT_PX:g} "
+        f"px, may have sharp edges where {MOVED_GROUND_SHARE:g} of what is left varies alike",
         "suites margins and attacks",
         WITHOUT,
         _locked,
@@ -235,10 +234,11 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing else in common",
-        "of images that are no two radars' or one camera's, both without windows that vary alike "
-        "and without the surroundings of edges that coincide, the mean similarity of chips all "
-        f"over is below {LEAST_OF_REST:g} times the robust standard deviation of one of them; "
-        "unless a mask leaves the ground alone",
+        "of images that are no two radars' or one camera's, nor two cameras' that are displaced as "
+        "ground is (as above), both without windows that vary alike and without the surroundings "
+        "of edges that coincide, the mean similarity of chips all over is below "
+        f"{LEAST_OF_REST:g} times the robust standard deviation of one of them; unless a mask "
+        "leaves the ground alone",
         "suites real and attacks",
         WITHOUT,
         _nothing_else,
