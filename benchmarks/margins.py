@@ -18,8 +18,8 @@ import numpy as np
 from groundtie.errors import GroundTieError
 from groundtie.geometry.judging import RIVAL_HEIGHT
 from groundtie.kinds import plain
-from groundtie.matching.locked import Sensors
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import Survey
 from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import RegistrationEvidence

@@ -21,7 +21,8 @@ import numpy as np
 from groundtie.context import threads
 from groundtie.geometry.transform import Transform
 from groundtie.kinds import plain
-from groundtie.matching.locked import EXACT_PX, Sensors, find_locked_content
+from groundtie.matching.locked import EXACT_PX, find_locked_content
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster

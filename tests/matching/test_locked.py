@@ -15,24 +15,14 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
-from groundtie.matching.locked import (
-    EXACT_PX,
-    LockedContent,
-    Sensors,
-    SharedContent,
-    find_locked_content,
-)
+from groundtie.matching.locked import EXACT_PX, LockedContent, find_locked_content
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import survey_places
 from groundtie.rasters.grid import Grid, compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.similarity.in_common import VIEW_SHARPNESS, Sameness
 
 SIDE = 320
-
-# Shares that are the same of one sensor's views, the more, the coarser the pixels.
-OF_ONE_GROUND = {"area": 0.4, "reduced_area": 0.7, "coarse_area": 0.8, "ground": 0.4}
-ONE_GROUND = Sameness(sharpness=1.5, **OF_ONE_GROUND)
 
 
 def looked_at(
@@ -109,8 +99,6 @@ def test_lines_that_are_drawn_in_other_widths_are_found(
     assert locked is not None and locked.shared.sameness.is_evident
     assert locked.shared.sameness.has_edges_beside and not locked.shared.sameness.has_sharp_edges
     assert locked.shared.is_drawn
-    alike = replace(locked.shared.sameness, **OF_ONE_GROUND)
-    assert replace(locked.shared, sameness=alike).is_drawn
 
 
 @pytest.mark.parametrize("off_m", [0.0, 5.0, 10.0, 15.0])
@@ -257,78 +245,12 @@ def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
     assert locked.shared.sameness.varies_as_ground == (place == 1)
 
 
-@pytest.mark.parametrize(
-    ("ground", "related", "is_ground"), [(0.3, 0.0, True), (0.0, 0.3, True), (0.1, 0.1, False)]
-)
-def test_ground_varies_alike_or_follows_in_other_colours(
-    ground: float, related: float, is_ground: bool
-) -> None:
-    """As of a negative, of which nothing varies alike."""
-    assert Sameness(1.0, 0.1, 0.2, 0.3, ground, related).varies_as_ground == is_ground
-
-
 @pytest.mark.slow
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
     """Most windows vary alike; so do those of reduced images where single pixels do not."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None and locked.shared.sameness.area > 0.5
     assert locked.shared.is_explained
-
-
-@pytest.mark.parametrize(("coarse", "is_view"), [(0.66, True), (0.6, False)])
-def test_views_are_a_little_less_alike_in_coarser_pixels(coarse: float, is_view: bool) -> None:
-    """Light and seasons differ over wide areas; two radar images have neither."""
-    sameness = replace(ONE_GROUND, coarse_area=coarse)
-    assert SharedContent(sameness, Sensors.CAMERAS).is_explained == is_view
-    assert sameness.is_finer_than_ground and not sameness.varies_as_ground
-
-
-@pytest.mark.parametrize("sensors", Sensors)
-def test_what_varies_alike_in_two_radar_images_is_no_ground(sensors: Sensors) -> None:
-    """Each view of a radar has speckle of its own."""
-    assert SharedContent(ONE_GROUND, sensors).is_explained == (sensors is Sensors.CAMERAS)
-
-
-@pytest.mark.parametrize(
-    ("shares", "is_evident"),
-    [
-        ({}, False),
-        ({"ground": 0.1}, True),
-        ({"coarse_area": 0.6}, True),
-        ({"sharpness": 3.0}, True),
-        ({"step_width": 0.2}, True),
-        ({"ground": 0.1, "related": 0.7}, True),
-        ({"area": 0.8}, True),
-    ],
-)
-def test_one_ground_in_pixels_of_many_looks_is_nothing_drawn(
-    shares: dict[str, float], is_evident: bool
-) -> None:
-    """But it is if hardly anything is left, and of two sensors' views, which differ."""
-    sameness = replace(ONE_GROUND, **shares)
-    assert sameness.is_evident
-    assert SharedContent(sameness, Sensors.RADARS).is_evident == is_evident
-    assert SharedContent(sameness, Sensors.DIFFERENT).is_evident
-
-
-def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground() -> None:
-    # As of one exposure's bands.
-    views = replace(ONE_GROUND, sharpness=4.2)
-    assert views.is_view
-    assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
-    copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)
-    assert copy.is_copy and copy.has_sharp_edges
-    assert not replace(copy, sharpness=0.9 * VIEW_SHARPNESS).has_sharp_edges
-
-
-@pytest.mark.parametrize(
-    ("sharpness", "related", "is_drawn"), [(2.8, 0.0, False), (3.0, 0.0, True), (3.0, 0.8, False)]
-)
-def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(
-    sharpness: float, related: float, is_drawn: bool
-) -> None:
-    sameness = replace(ONE_GROUND, sharpness=sharpness, related=related, ground=0.0)
-    assert SharedContent(sameness, Sensors.CAMERAS).is_drawn == is_drawn
 
 
 @pytest.mark.parametrize(
@@ -352,34 +274,6 @@ def test_what_is_drawn_moves_by_whole_pixels_or_hardly_at_all(
         locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
         assert locked is not None
         assert locked.shared.moves_as_ground == (is_moved and sensors is Sensors.CAMERAS)
-
-
-@pytest.mark.parametrize(
-    ("ground", "beside", "off_drawn", "is_explained", "is_drawn"),
-    [
-        (0.20, 0.0, 0.9, False, True),
-        (0.20, 0.0, 1.1, True, False),
-        (0.20, 1.5, 1.1, True, True),
-        (0.12, 0.0, 1.1, False, True),
-    ],
-)
-def test_views_that_move_as_ground_may_have_sharp_edges_and_leave_little(
-    ground: float, beside: float, off_drawn: float, is_explained: bool, is_drawn: bool
-) -> None:
-    sameness = replace(ONE_GROUND, sharpness=8.0, ground=ground, beside=beside)
-    shared = SharedContent(sameness, Sensors.CAMERAS, off_drawn=off_drawn)
-    assert shared.is_explained == is_explained and shared.is_drawn == is_drawn
-    assert shared.may_hide_ground == (off_drawn < 1)
-
-
-@pytest.mark.parametrize("sensors", Sensors)
-@pytest.mark.parametrize("off_drawn", [0.9, 1.1])
-def test_a_little_that_is_the_same_may_be_drawn_where_it_moves_so(
-    sensors: Sensors, off_drawn: float
-) -> None:
-    """Cameras' images alone show whether it does."""
-    shared = SharedContent(replace(ONE_GROUND, area=0.1, ground=0.0), sensors, off_drawn=off_drawn)
-    assert shared.may_be_drawn == (off_drawn < 1 or sensors is not Sensors.CAMERAS)
 
 
 def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:

@@ -10,8 +10,8 @@ from raster_files import write_raster
 from turned_pairs import turned_pair
 
 from groundtie.context import Context
-from groundtie.matching.locked import Sensors
 from groundtie.matching.pose_survey import PoseSurvey, survey_pose
+from groundtie.matching.shared_content import Sensors
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_windows import read_windows
 from groundtie.rasters.pair import Image, make_pair

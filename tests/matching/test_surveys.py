@@ -11,8 +11,9 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.transform import Transform
 from groundtie.matching.chips import ChipMatcher
-from groundtie.matching.locked import EXACT_PX, Sensors
+from groundtie.matching.locked import EXACT_PX
 from groundtie.matching.parts import ELSEWHERE_PX
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
 from groundtie.matching.surveys import Rest, survey_rest
 from groundtie.rasters.pair import Image, make_pair

@@ -47,7 +47,7 @@ from groundtie.errors import (
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.used import GROUND, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
-from groundtie.matching.locked import Sensors
+from groundtie.matching.shared_content import Sensors
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
 from groundtie.registration import rules

@@ -33,7 +33,7 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
-from groundtie.matching.locked import Sensors
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit

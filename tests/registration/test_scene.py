@@ -14,7 +14,7 @@ from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
 
 from groundtie.kinds import AUTO
 from groundtie.masks.used import INPUT, REFERENCE
-from groundtie.matching.locked import Sensors
+from groundtie.matching.shared_content import Sensors
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration import scene as scene_module

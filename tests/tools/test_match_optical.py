@@ -24,7 +24,7 @@ from groundtie.features.classifier_training import Training, train_classifier
 from groundtie.geometry.tie_point_files import read_tie_points
 from groundtie.geometry.transform import load_transform
 from groundtie.masks import ground
-from groundtie.matching.locked import Sensors
+from groundtie.matching.shared_content import Sensors
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration import pipeline
 from groundtie.registration.rules import scene as scene_rules

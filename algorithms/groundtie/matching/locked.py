@@ -8,7 +8,6 @@ images that share them match there, whatever ground they show.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,6 @@ from ..similarity.description import BORDER_PX
 from ..similarity.in_common import (
     LOOK_REACH_PX,
     Look,
-    Sameness,
     drawn_edges,
     sameness_of,
 )
@@ -30,6 +28,7 @@ from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
 from ..similarity.seams import seams, step_products
 from .chip_windows import ChipWindows, Resampled, singly
 from .matcher import Places
+from .shared_content import Sensors, SharedContent
 
 # Steps between whole columns are compared unresampled, radar images as if on whole pixels, where a
 # transform is so near to those.
@@ -51,90 +50,6 @@ _SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
 
 # Around a part that is masked, what lies there is looked at, too.
 _RIM_PX = 2 * REACH_PX
-
-
-class Sensors(Enum):
-    """What sensors the images may be of."""
-
-    CAMERAS = "cameras"
-    RADARS = "radars"
-    DIFFERENT = "radar and camera"
-
-
-@dataclass(frozen=True)
-class SharedContent:
-    """What images have the same where a transform has them, and what it may be.
-
-    Parameters
-    ----------
-    sameness
-        How much.
-    sensors
-        What the images may be.
-    is_exact
-        Whether the transform moves the array by whole pixels all over, whatever is nominal.
-        Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
-        one ground vary alike where it has averaged out: those that do not count as exact.
-    off_drawn
-        How far the transform is from those that move what is drawn: by whole pixels of the array,
-        or hardly at all on the map. Up to 1, it may be one of them.
-    """
-
-    sameness: Sameness
-    sensors: Sensors
-    is_exact: bool = False
-    off_drawn: float = 0.0
-
-    @property
-    def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground, or lies too exactly so.
-
-        Two radar images of one ground vary alike where speckle has averaged out, as in pixels of
-        many looks.
-        """
-        same = self.sameness
-        has_one_ground = same.has_one_ground and not same.covers_most
-        is_ground = self.sensors is Sensors.RADARS and has_one_ground
-        return self.is_exact or same.is_marked or (same.covers_much and not is_ground)
-
-    @property
-    def moves_as_ground(self) -> bool:
-        """Whether the transform moves cameras' images as nothing drawn is moved."""
-        return self.sensors is Sensors.CAMERAS and self.off_drawn > 1
-
-    @property
-    def may_be_drawn(self) -> bool:
-        """Whether what is the same may be all that matches, though no more than of one ground."""
-        covers_some = self.sameness.covers_some
-        return covers_some and not (self.is_explained or self.moves_as_ground)
-
-    @property
-    def is_explained(self) -> bool:
-        """Whether the images are copies, or one camera's views of one ground.
-
-        What is left of them need not confirm the transform: copies leave nothing, and what a camera
-        shows alike is most of what it shows. Each view of a radar has speckle of its own.
-        """
-        if self.sensors is Sensors.DIFFERENT:
-            return False
-        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
-        is_moved = self.moves_as_ground and self.sameness.leaves_ground
-        return is_view or is_moved or self.sameness.is_copy
-
-    @property
-    def may_hide_ground(self) -> bool:
-        """Whether what is explained may be drawn all the same, by its edges and place."""
-        return self.sameness.has_sharp_edges and not self.moves_as_ground
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether its edges are not those of one ground.
-
-        They lie beside one another; or they are sharper, of what is no copy or view.
-        """
-        same = self.sameness
-        is_image = self.is_explained or same.is_copy_in_other_colours
-        return same.has_edges_beside or (same.has_sharp_edges and not is_image)
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
-from .locked import Sensors
 from .matcher import MaskOf, Places
+from .shared_content import Sensors
 from .survey import SURVEY_RADIUS_PX, survey_model, survey_places
 from .surveys import Surveys, survey_all
 

@@ -10,9 +10,10 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
-from .locked import Sensors, SharedContent, find_locked_content
+from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
+from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
 # Of images that are no two radars' or one camera's, windows that vary alike, and edges that

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
 from ..kinds import AUTO
-from ..matching.locked import Sensors
+from ..matching.shared_content import Sensors
 from ..progress import SILENT, Progress
 from ..rasters.reading import open_raster
 from ..sensor.rpc_files import rpc_of

@@ -13,7 +13,7 @@ from ..context import Context
 from ..masks.ground import find_ground
 from ..masks.surface_model import SurfaceGround
 from ..masks.used import GROUND, OPEN, REFERENCE, MaskUsed
-from ..matching.locked import Sensors
+from ..matching.shared_content import Sensors
 from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask

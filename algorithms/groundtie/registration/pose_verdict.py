@@ -18,8 +18,8 @@ from ..geometry.judging import SMALLEST_INLIER_SHARE, SMALLEST_SHARE_UNROTATED
 from ..geometry.limits import SearchLimits
 from ..geometry.misses import Misses
 from ..masks.used import MaskUsed
-from ..matching.locked import Sensors
 from ..matching.pose_survey import POSE_TOLERANCE_PX, PoseSurvey, survey_pose
+from ..matching.shared_content import Sensors
 from ..matching.survey import SURVEY_RADIUS_PX
 from ..matching.surveys import Surveys
 from ..pose.pose import Pose, PoseFound

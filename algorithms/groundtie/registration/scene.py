@@ -16,7 +16,7 @@ from ..masks.scene import Scene
 from ..masks.town import PERHAPS_TOWN_SHARE, TOWN_SHARE, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.band_shifts import BandShift, band_shifts
-from ..matching.locked import Sensors
+from ..matching.shared_content import Sensors
 from ..rasters.grid import PointFunction
 from ..rasters.pair import Image, ImagePair
 from ..rasters.radar_tags import is_known_radar

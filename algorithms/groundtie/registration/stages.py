@@ -18,10 +18,11 @@ from ..matching.chips import ChipMatcher
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import GuidedFit, KeypointFit
 from ..matching.keypoints import KeypointMatcher
-from ..matching.locked import EXACT_PX, Sensors
+from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
+from ..matching.shared_content import Sensors
 from ..matching.surface_fit import SurfaceFit, SurfaceMatcher
 from ..matching.survey import survey_places
 from ..matching.surveys import Surveys, survey_all

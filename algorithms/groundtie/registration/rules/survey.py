@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from ...geometry.judging import RIVAL_HEIGHT
-from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT, Sensors
+from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
 from ...matching.parts import LEAST_EXCESS
+from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ...matching.surveys import LEAST_OF_REST, Rest
 from ...similarity.in_common import MOVED_GROUND_SHARE

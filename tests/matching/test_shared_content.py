@@ -1,0 +1,112 @@
+"""What images share: whether it is one ground, a copy, or something drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from groundtie.matching.shared_content import Sensors, SharedContent
+from groundtie.similarity.in_common import VIEW_SHARPNESS, Sameness
+
+# Shares that are the same of one sensor's views: the more, the coarser the pixels.
+ONE_GROUND = Sameness(sharpness=1.5, area=0.4, reduced_area=0.7, coarse_area=0.8, ground=0.4)
+
+
+@pytest.mark.parametrize(
+    ("ground", "related", "is_ground"), [(0.3, 0.0, True), (0.0, 0.3, True), (0.1, 0.1, False)]
+)
+def test_ground_varies_alike_or_follows_in_other_colours(
+    ground: float, related: float, is_ground: bool
+) -> None:
+    """As of a negative, of which nothing varies alike."""
+    assert Sameness(1.0, 0.1, 0.2, 0.3, ground, related).varies_as_ground == is_ground
+
+
+@pytest.mark.parametrize(("coarse", "is_view"), [(0.66, True), (0.6, False)])
+def test_views_are_a_little_less_alike_in_coarser_pixels(coarse: float, is_view: bool) -> None:
+    """Light and seasons differ over wide areas; two radar images have neither."""
+    sameness = replace(ONE_GROUND, coarse_area=coarse)
+    assert SharedContent(sameness, Sensors.CAMERAS).is_explained == is_view
+    assert sameness.is_finer_than_ground and not sameness.varies_as_ground
+
+
+@pytest.mark.parametrize("sensors", Sensors)
+def test_what_varies_alike_in_two_radar_images_is_no_ground(sensors: Sensors) -> None:
+    """Each view of a radar has speckle of its own."""
+    assert SharedContent(ONE_GROUND, sensors).is_explained == (sensors is Sensors.CAMERAS)
+
+
+@pytest.mark.parametrize(
+    ("shares", "is_evident"),
+    [
+        ({}, False),
+        ({"ground": 0.1}, True),
+        ({"coarse_area": 0.6}, True),
+        ({"sharpness": 3.0}, True),
+        ({"step_width": 0.2}, True),
+        ({"ground": 0.1, "related": 0.7}, True),
+        ({"area": 0.8}, True),
+    ],
+)
+def test_one_ground_in_pixels_of_many_looks_is_nothing_drawn(
+    shares: dict[str, float], is_evident: bool
+) -> None:
+    """But it is if hardly anything is left, and of two sensors' views, which differ."""
+    sameness = replace(ONE_GROUND, **shares)
+    assert sameness.is_evident
+    assert SharedContent(sameness, Sensors.RADARS).is_evident == is_evident
+    assert SharedContent(sameness, Sensors.DIFFERENT).is_evident
+
+
+def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground() -> None:
+    # As of one exposure's bands.
+    views = replace(ONE_GROUND, sharpness=4.2)
+    assert views.is_view
+    assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
+    copy = replace(views, area=0.8, reduced_area=0.8, sharpness=VIEW_SHARPNESS)
+    assert copy.is_copy and copy.has_sharp_edges
+    assert not replace(copy, sharpness=0.9 * VIEW_SHARPNESS).has_sharp_edges
+
+
+@pytest.mark.parametrize(
+    ("sharpness", "related", "is_drawn"), [(2.8, 0.0, False), (3.0, 0.0, True), (3.0, 0.8, False)]
+)
+def test_sharp_edges_are_drawn_but_those_of_copies_in_other_colours(
+    sharpness: float, related: float, is_drawn: bool
+) -> None:
+    sameness = replace(ONE_GROUND, sharpness=sharpness, related=related, ground=0.0)
+    assert SharedContent(sameness, Sensors.CAMERAS).is_drawn == is_drawn
+
+
+@pytest.mark.parametrize(
+    ("ground", "beside", "off_drawn", "is_explained", "is_drawn"),
+    [
+        (0.20, 0.0, 0.9, False, True),
+        (0.20, 0.0, 1.1, True, False),
+        (0.20, 1.5, 1.1, True, True),
+        (0.12, 0.0, 1.1, False, True),
+    ],
+)
+def test_views_that_move_as_ground_may_have_sharp_edges_and_leave_little(
+    ground: float, beside: float, off_drawn: float, is_explained: bool, is_drawn: bool
+) -> None:
+    sameness = replace(ONE_GROUND, sharpness=8.0, ground=ground, beside=beside)
+    shared = SharedContent(sameness, Sensors.CAMERAS, off_drawn=off_drawn)
+    assert shared.is_explained == is_explained and shared.is_drawn == is_drawn
+    assert shared.may_hide_ground == (off_drawn < 1)
+
+
+@pytest.mark.parametrize("sensors", Sensors)
+@pytest.mark.parametrize("off_drawn", [0.9, 1.1])
+def test_a_little_that_is_the_same_may_be_drawn_where_it_moves_so(
+    sensors: Sensors, off_drawn: float
+) -> None:
+    """Cameras' images alone show whether it does."""
+    shared = SharedContent(replace(ONE_GROUND, area=0.1, ground=0.0), sensors, off_drawn=off_drawn)
+    assert shared.may_be_drawn == (off_drawn < 1 or sensors is not Sensors.CAMERAS)
+
+
+def test_edges_to_one_side_are_drawn_however_alike_the_rest_is() -> None:
+    assert SharedContent(replace(ONE_GROUND, beside=1.1), Sensors.CAMERAS).is_drawn
+    assert not SharedContent(replace(ONE_GROUND, beside=0.9), Sensors.CAMERAS).is_drawn
