@@ -47,15 +47,15 @@ class SharedContent:
         Two radar images of one ground vary alike where speckle has averaged out, as in pixels of
         many looks.
         """
-        same = self.sameness
+        same, are_radars = self.sameness, self.sensors is Sensors.RADARS
         has_one_ground = same.has_one_ground and not same.covers_most
-        is_ground = self.sensors is Sensors.RADARS and has_one_ground
+        is_ground = are_radars and self.moves_as_ground and has_one_ground
         return self.is_exact or same.is_marked or (same.covers_much and not is_ground)
 
     @property
     def moves_as_ground(self) -> bool:
-        """Whether the transform moves cameras' images as nothing drawn is moved."""
-        return self.sensors is Sensors.CAMERAS and self.off_drawn > 1
+        """Whether the transform moves images of one kind of sensor as nothing drawn is moved."""
+        return self.sensors is not Sensors.DIFFERENT and self.off_drawn > 1
 
     @property
     def may_be_drawn(self) -> bool:
@@ -72,9 +72,9 @@ class SharedContent:
         """
         if self.sensors is Sensors.DIFFERENT:
             return False
-        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
         is_moved = self.moves_as_ground and self.sameness.leaves_ground
-        return is_view or is_moved or self.sameness.is_copy
+        is_view = self.sensors is Sensors.CAMERAS and (self.sameness.is_view or is_moved)
+        return is_view or self.sameness.is_copy
 
     @property
     def may_hide_ground(self) -> bool:
