@@ -98,14 +98,28 @@ def test_views_that_move_as_ground_may_have_sharp_edges_and_leave_little(
     assert shared.may_hide_ground == (off_drawn < 1)
 
 
-@pytest.mark.parametrize("sensors", Sensors)
-@pytest.mark.parametrize("off_drawn", [0.9, 1.1])
-def test_a_little_that_is_the_same_may_be_drawn_where_it_moves_so(
-    sensors: Sensors, off_drawn: float
+@pytest.mark.parametrize(
+    ("sensors", "ground", "off_drawn", "may_be_drawn"),
+    [
+        (Sensors.CAMERAS, 0.2, 0.9, True),
+        (Sensors.CAMERAS, 0.2, 1.1, False),
+        (Sensors.CAMERAS, 0.1, 1.1, True),
+        (Sensors.DIFFERENT, 0.2, 1.1, True),
+    ],
+)
+def test_a_little_that_is_the_same_may_be_drawn_unless_it_is_a_moved_view(
+    sensors: Sensors, ground: float, off_drawn: float, may_be_drawn: bool
 ) -> None:
-    """A radar's and a camera's images share little, wherever they lie."""
-    shared = SharedContent(replace(ONE_GROUND, area=0.1, ground=0.0), sensors, off_drawn=off_drawn)
-    assert shared.may_be_drawn == (off_drawn < 1 or sensors is Sensors.DIFFERENT)
+    sameness = replace(ONE_GROUND, area=0.1, ground=ground)
+    assert SharedContent(sameness, sensors, off_drawn=off_drawn).may_be_drawn == may_be_drawn
+
+
+def test_copies_may_hide_ground_wherever_they_lie() -> None:
+    """A part of the other image may be another place, of which they leave little."""
+    copy = Sameness(sharpness=8.0, area=0.8, reduced_area=0.8, coarse_area=0.8, ground=0.2)
+    shared = SharedContent(copy, Sensors.CAMERAS, off_drawn=1.1)
+    assert copy.is_copy and shared.is_explained and shared.may_hide_ground
+    assert not replace(shared, sameness=replace(copy, coarse_area=0.7)).may_hide_ground
 
 
 def test_edges_to_one_side_are_drawn_however_alike_the_rest_is() -> None:

@@ -60,8 +60,7 @@ class SharedContent:
     @property
     def may_be_drawn(self) -> bool:
         """Whether what is the same may be all that matches, though no more than of one ground."""
-        covers_some = self.sameness.covers_some
-        return covers_some and not (self.is_explained or self.moves_as_ground)
+        return self.sameness.covers_some and not self.is_explained
 
     @property
     def is_explained(self) -> bool:
@@ -72,14 +71,19 @@ class SharedContent:
         """
         if self.sensors is Sensors.DIFFERENT:
             return False
-        is_moved = self.moves_as_ground and self.sameness.leaves_ground
-        is_view = self.sensors is Sensors.CAMERAS and (self.sameness.is_view or is_moved)
-        return is_view or self.sameness.is_copy
+        is_view = self.sensors is Sensors.CAMERAS and self.sameness.is_view
+        return is_view or self.is_moved_view or self.sameness.is_copy
+
+    @property
+    def is_moved_view(self) -> bool:
+        """Whether cameras' images are views of one ground by where they lie, and no copies."""
+        are_views = self.sensors is Sensors.CAMERAS and not self.sameness.is_copy
+        return are_views and self.moves_as_ground and self.sameness.leaves_ground
 
     @property
     def may_hide_ground(self) -> bool:
         """Whether what is explained may be drawn all the same, by its edges and place."""
-        return self.sameness.has_sharp_edges and not self.moves_as_ground
+        return self.sameness.has_sharp_edges and not self.is_moved_view
 
     @property
     def is_drawn(self) -> bool:

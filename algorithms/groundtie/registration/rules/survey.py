@@ -235,11 +235,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing else in common",
-        "of images that are no two radars' or one camera's, nor two cameras' that are displaced as "
-        "ground is (as above), both without windows that vary alike and without the surroundings "
-        "of edges that coincide, the mean similarity of chips all over is below "
-        f"{LEAST_OF_REST:g} times the robust standard deviation of one of them; unless a mask "
-        "leaves the ground alone",
+        "of images that are no two radars' or one camera's, both without windows that vary alike "
+        "and without the surroundings of edges that coincide, the mean similarity of chips all "
+        f"over is below {LEAST_OF_REST:g} times the robust standard deviation of one of them; "
+        "unless a mask leaves the ground alone",
         "suites real and attacks",
         WITHOUT,
         _nothing_else,
