@@ -95,7 +95,7 @@ def test_views_that_move_as_ground_may_have_sharp_edges_and_leave_little(
     sameness = replace(ONE_GROUND, sharpness=8.0, ground=ground, beside=beside)
     shared = SharedContent(sameness, Sensors.CAMERAS, off_drawn=off_drawn)
     assert shared.is_explained == is_explained and shared.is_drawn == is_drawn
-    assert shared.may_hide_ground == (off_drawn < 1)
+    assert shared.may_hide_ground == (not is_explained)
 
 
 @pytest.mark.parametrize(

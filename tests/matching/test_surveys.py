@@ -36,7 +36,7 @@ def place(shift: tuple[int, int] = (0, 0)) -> np.ndarray:
     return canvas[top : top + SIDE, left : left + SIDE]
 
 
-def noisy(values: np.ndarray, seed: int, deviation: float = 0.2) -> np.ndarray:
+def noisy(values: np.ndarray, seed: int, deviation: float | np.ndarray = 0.2) -> np.ndarray:
     return values + deviation * np.random.default_rng(seed).normal(size=values.shape)
 
 
@@ -133,20 +133,21 @@ def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
     assert rest is not None and rest.shared.is_explained and rest.survey is None
 
 
-@pytest.mark.parametrize(("offset", "is_asked"), [((6, -4), True), ((6.4, -3.7), False)])
+@pytest.mark.parametrize(("offset", "is_drawn"), [((6, -4), True), ((6.4, -3.7), False)])
 @pytest.mark.slow
-def test_of_views_that_moved_as_ground_does_nothing_more_is_asked(
-    offset: tuple[float, float], is_asked: bool, tmp_path: Path, context: Context
+def test_views_with_edges_as_sharp_as_drawn_ones_are_taken_for_such_at_whole_pixels(
+    offset: tuple[float, float], is_drawn: bool, tmp_path: Path, context: Context
 ) -> None:
-    """Fields, with edges as sharp as those of what is drawn; those move by whole pixels alone."""
-    fine = zoomed(np.round(place()), 5)
+    """Fields; half are seen through haze, alike in coarser pixels alone, so that none is a copy."""
+    fine, noise = zoomed(np.round(place()), 5), np.where(np.arange(SIDE) < SIDE // 2, 0.1, 1.2)
     reference, input = (
         zoomed_out(ndimage.shift(fine, np.multiply(5, by), mode="mirror", order=1), 5)
         for by in ((0.0, 0.0), offset[::-1])
     )
-    rest = rest_of(tmp_path, noisy(reference, 1, 0.1), noisy(input, 2, 0.1), context, offset)
-    assert rest is not None and rest.shared.is_explained and rest.beyond is not None
-    assert (rest.survey is not None) == is_asked
+    views = noisy(reference, 1, noise), noisy(input, 2, noise)
+    rest = rest_of(tmp_path, *views, context, offset)
+    assert rest is not None and rest.shared.sameness.has_sharp_edges and rest.survey is None
+    assert rest.shared.is_drawn == is_drawn and (rest.beyond is None) == is_drawn
     assert deviations_beyond(rest) < REST_PEAK_DEVIATIONS
 
 
