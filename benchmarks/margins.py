@@ -115,10 +115,8 @@ def _off_drawn(evidence: RegistrationEvidence) -> float:
 
 def _moved_ground(evidence: RegistrationEvidence) -> float:
     """Return how much of what is left varies alike, of images that are moved as ground is."""
-    rest = _without_drawn(evidence)
-    if rest is None or not rest.shared.moves_as_ground:
-        return math.nan
-    return rest.shared.sameness.ground
+    rest, is_moved = _without_drawn(evidence), _off_drawn(evidence) > 1
+    return rest.shared.sameness.ground if rest is not None and is_moved else math.nan
 
 
 def _height_of_else(evidence: RegistrationEvidence) -> float:

@@ -271,8 +271,6 @@ def test_what_is_drawn_moves_by_whole_pixels_or_hardly_at_all(
     model = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
     locked = looked_at(tmp_path, sensed(1), sensed(2, place=9), context, model)
     assert locked is not None and locked.shared.moves_as_ground == is_moved
-    different = replace(locked.shared, sensors=Sensors.DIFFERENT)
-    assert not different.moves_as_ground
 
 
 def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Context) -> None:

@@ -47,15 +47,14 @@ class SharedContent:
         Two radar images of one ground vary alike where speckle has averaged out, as in pixels of
         many looks.
         """
-        same, are_radars = self.sameness, self.sensors is Sensors.RADARS
-        has_one_ground = same.has_one_ground and not same.covers_most
-        is_ground = are_radars and self.moves_as_ground and has_one_ground
+        same, are_moved = self.sameness, self.sensors is Sensors.RADARS and self.moves_as_ground
+        is_ground = are_moved and same.has_one_ground and not same.covers_most
         return self.is_exact or same.is_marked or (same.covers_much and not is_ground)
 
     @property
     def moves_as_ground(self) -> bool:
-        """Whether the transform moves images of one kind of sensor as nothing drawn is moved."""
-        return self.sensors is not Sensors.DIFFERENT and self.off_drawn > 1
+        """Whether the transform moves the image as nothing drawn is moved."""
+        return self.off_drawn > 1
 
     @property
     def may_be_drawn(self) -> bool:
