@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from affine import Affine
+from evidences import VIEWS
 from raster_files import utm_grid, write_raster
 from textured_pairs import shift_on_map, texture
 
@@ -99,6 +100,8 @@ def test_lines_that_are_drawn_in_other_widths_are_found(
     assert locked is not None and locked.shared.sameness.is_evident
     assert locked.shared.sameness.has_edges_beside and not locked.shared.sameness.has_sharp_edges
     assert locked.shared.is_drawn
+    alike = replace(VIEWS, beside=locked.shared.sameness.beside)
+    assert replace(locked.shared, sameness=alike).is_drawn
 
 
 @pytest.mark.parametrize("off_m", [0.0, 5.0, 10.0, 15.0])

@@ -49,7 +49,7 @@ class SharedContent:
         """
         same, are_moved = self.sameness, self.sensors is Sensors.RADARS and self.moves_as_ground
         is_ground = are_moved and same.has_one_ground and not same.covers_most
-        return self.is_exact or same.is_marked or (same.covers_much and not is_ground)
+        return self.is_exact or (same.is_marked if is_ground else same.is_evident)
 
     @property
     def moves_as_ground(self) -> bool:
