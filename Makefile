@@ -53,7 +53,7 @@ test-qgis: plugin
 	scripts/test_debian.sh tests/qgis
 
 test-newer-qgis: plugin ## the plugin in a newer Debian's QGIS, unpacked into build/ (as root)
-	scripts/test_newer_debian.sh tests/qgis
+	scripts/test_newer_debian.sh -n 2 --dist=loadfile tests/qgis
 
 lint: $(VENV)/.installed-dev ## ruff, mypy, import contracts
 	$(VENV)/bin/ruff check .

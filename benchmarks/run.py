@@ -16,6 +16,7 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 SUITES = (
     "real",
+    "one_grid",
     "crossings",
     "simulated",
     "city",

@@ -1,8 +1,9 @@
 """How sharply edges and steps coincide: of ground at its place, and of what is drawn over other.
 
 Ground at its place is that of all scenes of the red team, different bands of the shared series, of
-one date and of neighbouring ones: what cameras show of one ground in other colours; and dates of
-simulated series.
+one date and of neighbouring ones: what cameras show of one ground in other colours; dates of
+simulated series; and radar images without their speckle, which nothing distinguishes from a
+camera's, with a camera's.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise, product
 from pathlib import Path
@@ -27,20 +28,30 @@ from groundtie.matching.survey import survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.series.frame import PARAMETERS, SeriesFrame
-from groundtie.similarity.in_common import LEAST_SHARPNESS, MOST_BESIDE, VIEW_SHARPNESS, Sameness
+from groundtie.similarity.in_common import (
+    GROUND_SHARE,
+    LEAST_SHARPNESS,
+    MOST_BESIDE,
+    VIEW_SHARPNESS,
+    Sameness,
+)
 from groundtie.similarity.seams import DRAWN_WIDTH
+from groundtie.speckle.filters import SpeckleFilter
 
 from .accuracy import FloatArray
 from .attacks.cases import AttackCase, all_scenes, cases
 from .attacks.catalogue import LOCKED
 from .attacks.examples import is_example
-from .attacks.pairs import Pair
+from .attacks.pairs import Pair, to_bytes
+from .attacks.scenes import Scene
 from .attacks.suite import sample
+from .cases import SAR_OPTICAL
 from .series_scenes import simulate_series
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _QUICK, _SAMPLE = 4, 60
 BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
+DESPECKLED = "despeckled radar with camera"
 SIMULATED_DATES, DATES = "simulated dates of one camera", "dates of one camera, years apart"
 
 # Series of other seeds than the suite series has, and dates of each.
@@ -160,6 +171,14 @@ def _sameness(
     return locked.shared.sameness
 
 
+def _despeckled(scene: Scene, seed: int, cache: Path) -> Pair:
+    """Return a scene's pair, its radar image smoothed by a speckle filter."""
+    pair = scene.pair(seed, cache)
+    amplitude = pair.reference[0].astype(np.float32)
+    power = SpeckleFilter("enhanced-frost", 7, 1.0)(amplitude**2, amplitude > 0)
+    return replace(pair, reference=to_bytes(np.sqrt(power)[None]))
+
+
 def bands_of_series(folder: Path) -> list[Bands]:
     """Return bands of one exposure, and of dates that lie on one grid."""
     found = []
@@ -185,6 +204,17 @@ def run(settings: Settings) -> SuiteResult:
             Case(f"{name} {seed}", scene.kind, False, partial(scene.pair, seed, settings.cache))
             for name, scene in all_scenes(settings.data).items()
             if not (is_example(scene) or scene.is_large)
+            for seed in seeds
+        ),
+        *(
+            Case(
+                f"{name} {seed}",
+                DESPECKLED,
+                False,
+                partial(_despeckled, scene, seed, settings.cache),
+            )
+            for name, scene in all_scenes(settings.data).items()
+            if scene.kind == SAR_OPTICAL and not (is_example(scene) or scene.is_large)
             for seed in seeds
         ),
     ]
@@ -215,6 +245,8 @@ def run(settings: Settings) -> SuiteResult:
     most_beside = max((one.sameness.beside for one in every if not one.is_drawn), default=0.0)
     others = [one for one in apart if one.group not in (BANDS_APART, DATES)]
     least = min((one.sameness.step_width for one in others), default=np.inf)
+    coarse = [one.sameness.coarse_area for one in every if one.group == DESPECKLED]
+    most_coarse = max(coarse, default=0.0)
     return SuiteResult(
         "How sharply edges coincide",
         (
@@ -242,6 +274,12 @@ def run(settings: Settings) -> SuiteResult:
                 f"at least {least:.2f}",
                 least > DRAWN_WIDTH,
             ),
+            Goal(
+                "Coarse pixels alike of a despeckled radar's and a camera's images",
+                f"below {GROUND_SHARE:.0%}",
+                f"at most {most_coarse:.0%}",
+                most_coarse < GROUND_SHARE,
+            ),
         ),
         (
             _table("Ground at its place", ground),
@@ -268,9 +306,16 @@ def _views_table(title: str, some: list[Measured]) -> Table:
     for group, own in _by_group(some):
         coarse = [one.coarse_area / one.reduced_area for one in own]
         sharpness = [one.sharpness for one in own]
-        least = min(sharpness), max(sharpness), min(one.ground for one in own), min(coarse)
+        alike = min(one.coarse_area for one in own)
+        least = (
+            *(min(sharpness), max(sharpness)),
+            *(min(one.ground for one in own), min(coarse), alike),
+        )
         rows.append([group, str(len(own)), *(f"{number:.2f}" for number in least)])
-    columns = "", "pairs", "least sharp", "sharpest", "least ground", "least in coarser pixels"
+    columns = (
+        *("", "pairs", "least sharp", "sharpest", "least ground", "least in coarser pixels"),
+        "least coarse pixels alike",
+    )
     return Table(title, columns, rows)
 
 
@@ -291,10 +336,12 @@ def _table(title: str, some: list[Measured]) -> Table:
         evident = sum(one.is_evident for one in own)
         low, middle, high = np.percentile(values, [0, 50, 100])
         beside = [one.beside for one in own]
+        coarse = [one.coarse_area for one in own]
         numbers = f"{low:.2f}", f"{middle:.2f}", f"{high:.2f}", str(above), f"{max(beside):.2f}"
-        rows.append([group, str(len(values)), *numbers, str(evident)])
+        alike = f"{min(coarse):.2f} to {max(coarse):.2f}"
+        rows.append([group, str(len(values)), *numbers, alike, str(evident)])
     columns = (
         *("", "pairs", "least", "median", "most", "at the limit or above"),
-        *("most to one side", "evident in all"),
+        *("most to one side", "coarse pixels alike", "evident in all"),
     )
     return Table(title, columns, rows)

@@ -226,7 +226,7 @@ def time_radar(times: int) -> list[Record]:
             path = Path(folder) / "radar.tif"
             profile = {"driver": "GTiff", "dtype": "float32", "count": 1}
             # The ground of a town is found by sizes in metres.
-            profile["transform"] = Affine.scale(1.0, -1.0)
+            profile |= {"transform": Affine.scale(1.0, -1.0), "crs": "EPSG:32632"}
             with rasterio.open(path, "w", width=RADAR_PX, height=RADAR_PX, **profile) as written:
                 written.write(np.sqrt(image), 1)
             with open_raster(path) as source:

@@ -20,7 +20,7 @@ packages=(
     qgis python3-qgis qgis-providers
     python3-numpy python3-scipy python3-rasterio python3-opencv python3-sklearn python3-shapely
     python3-fiona python3-matplotlib python3-jinja2 python3-click
-    python3-pytest python3-hypothesis python3-markdown-it python3-yaml
+    python3-pytest python3-pytest-xdist python3-hypothesis python3-markdown-it python3-yaml
 )
 
 # The system's own source and keys serve for the newer suite, too; its state stays as it is.

@@ -223,7 +223,7 @@ def test_clouds_in_other_colours_are_masked_where_the_transform_is_evidence(
     locked = looked_at(tmp_path, *images, context)
     assert locked is not None and locked.shared.is_exact and locked.shared.sameness.area < 0.1
     assert masked(tmp_path, locked).mean() > 0.8
-    at_any_place = replace(locked, shared=replace(locked.shared, is_exact=False))
+    at_any_place = replace(locked, shared=replace(locked.shared, is_whole=False))
     assert masked(tmp_path, at_any_place).mean() < 0.2
 
 

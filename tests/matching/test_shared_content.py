@@ -125,3 +125,26 @@ def test_copies_may_hide_ground_wherever_they_lie() -> None:
 def test_edges_to_one_side_are_drawn_however_alike_the_rest_is() -> None:
     assert SharedContent(replace(ONE_GROUND, beside=1.1), Sensors.CAMERAS).is_drawn
     assert not SharedContent(replace(ONE_GROUND, beside=0.9), Sensors.CAMERAS).is_drawn
+
+
+@pytest.mark.parametrize(("ground", "is_exact"), [(0.2, True), (0.3, False)])
+def test_radar_images_of_one_ground_lie_near_whole_pixels_by_chance(
+    ground: float, is_exact: bool
+) -> None:
+    shared = SharedContent(replace(ONE_GROUND, ground=ground), Sensors.RADARS, is_whole=True)
+    assert shared.is_exact == is_exact
+    assert replace(shared, sensors=Sensors.CAMERAS).is_exact
+    assert not replace(shared, is_whole=False).is_exact
+
+
+@pytest.mark.parametrize(
+    ("reduced", "coarse", "is_of_cameras"),
+    [(0.24, 0.33, True), (0.14, 0.12, False), (0.2, 0.22, False), (0.4, 0.3, False)],
+)
+def test_cameras_images_are_alike_in_coarse_pixels(
+    reduced: float, coarse: float, is_of_cameras: bool
+) -> None:
+    """As a radar's and a camera's are not, with or without speckle."""
+    sameness = replace(ONE_GROUND, ground=0.1, reduced_area=reduced, coarse_area=coarse)
+    assert SharedContent(sameness, Sensors.CAMERAS).is_of_cameras == is_of_cameras
+    assert not SharedContent(sameness, Sensors.DIFFERENT).is_of_cameras

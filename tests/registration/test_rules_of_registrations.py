@@ -90,6 +90,13 @@ def test_a_town_whose_ground_was_matched_is_not_suspected(kind: str) -> None:
     assert "town matched whole" not in refusing(found)
 
 
+@pytest.mark.parametrize(("alike", "expected"), [(0.4, []), (0.2, ["town matched whole"])])
+def test_images_that_vary_as_one_sensors_are_no_radars(alike: float, expected: list[str]) -> None:
+    sameness = replace(DRAWN_OVER, area=0.1, reduced_area=alike, coarse_area=alike)
+    found = evidence(two_thirds(20), scene=PERHAPS, rest=leaving(sameness=sameness))
+    assert refusing(found) == expected
+
+
 def test_an_image_of_fields_is_not_suspected() -> None:
     assert refusing(evidence(two_thirds(20), scene=scene())) == []
 

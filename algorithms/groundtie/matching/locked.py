@@ -157,13 +157,10 @@ def find_locked_content(
     _, looks = seen.map(singly(Look.of), context)
     _, steps = unresampled.map(singly(step_products), context)
     sameness = sameness_of(looks, steps)
-    if sensors is Sensors.RADARS:
-        is_exact = is_near and not sameness.varies_as_ground
-    else:
-        is_exact = off_px <= exact_px
     off_nominal = _off_nominal_px(pair.grid, transform) / NOMINAL_PX
     off_drawn = min(off_px / (WHOLE_TIMES_EXACT * exact_px), off_nominal)
-    shared = SharedContent(sameness, sensors, is_exact, off_drawn)
+    is_whole = is_near if sensors is Sensors.RADARS else off_px <= exact_px
+    shared = SharedContent(sameness, sensors, is_whole, off_drawn)
     return LockedContent(pair, to_input, shared)
 
 

@@ -26,10 +26,9 @@ class SharedContent:
         How much.
     sensors
         What the images may be.
-    is_exact
-        Whether the transform moves the array by whole pixels all over, whatever is nominal.
-        Speckle moves what is drawn over two radars' images off whole pixels; but radar images of
-        one ground vary alike where it has averaged out: those that do not count as exact.
+    is_whole
+        Whether the transform moves the array by whole pixels all over, whatever is nominal, as far
+        as that is known: speckle moves what is drawn over two radars' images off whole pixels.
     off_drawn
         How far the transform is from those that move what is drawn: by whole pixels of the array,
         or hardly at all on the map. Up to 1, it may be one of them.
@@ -37,8 +36,18 @@ class SharedContent:
 
     sameness: Sameness
     sensors: Sensors
-    is_exact: bool = False
+    is_whole: bool = False
     off_drawn: float = 0.0
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it lies too exactly on whole pixels for ground.
+
+        Radar images of one ground vary alike where speckle has averaged out: those that do, do not
+        count as exact.
+        """
+        is_ground = self.sensors is Sensors.RADARS and self.sameness.varies_as_ground
+        return self.is_whole and not is_ground
 
     @property
     def is_evident(self) -> bool:
@@ -50,6 +59,14 @@ class SharedContent:
         same, are_moved = self.sameness, self.sensors is Sensors.RADARS and self.moves_as_ground
         is_ground = are_moved and same.has_one_ground and not same.covers_most
         return self.is_exact or (same.is_marked if is_ground else same.is_evident)
+
+    @property
+    def is_of_cameras(self) -> bool:
+        """Whether none of the images is a radar's, as far as what they share shows it.
+
+        A radar's and a camera's are hardly alike in coarse pixels, speckle or not.
+        """
+        return self.sensors is Sensors.CAMERAS and self.sameness.is_of_one_sensor
 
     @property
     def moves_as_ground(self) -> bool:

@@ -29,12 +29,12 @@ class Rest:
     Parameters
     ----------
     shared
-        That content.
+        That content, however little.
     chips
         How many chips there are; of some too little may be left.
     survey
-        What they show; None: it is not asked, as of content that is drawn, and of copies and views
-        that hide nothing.
+        What they show; None: it is not asked, as of hardly any such content, of what is drawn, and
+        of copies and views that hide nothing.
     beyond
         What they show beyond what the reference explains of the input, where it is explained;
         None elsewhere.
@@ -59,7 +59,7 @@ class Surveys:
     whole
         Of all that takes part; None: they were not asked, nor are the others then.
     rest
-        Without content that is the same in both arrays; None: there is none (see `survey_rest`).
+        Without content that is the same in both arrays; None: none is looked for.
     ground
         Of open ground; None: the images are not two radars', or it alone takes part.
     fine
@@ -133,20 +133,21 @@ def survey_rest(
 
     Returns
     -------
-    None where there is hardly any of such content, unless both images are a radar's: speckle blurs
-    it; where the images are one camera's views, which have no more of it than these; and where none
-    is looked for.
+    None where no such content is looked for. Chips are not asked where there is hardly any of it,
+    unless both images are a radar's: speckle blurs it; and where the images are one camera's views,
+    which have no more of it than these.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     elsewhere_px, exact_px = accuracy_px
     locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
     if locked is None:
         return None
-    shared, are_radars = locked.shared, sensors is Sensors.RADARS
+    shared, chips = locked.shared, len(places.centres)
+    are_radars = sensors is Sensors.RADARS
     if not (shared.is_evident or shared.may_be_drawn or are_radars):
-        return None
+        return Rest(shared, chips)
     # What a mask leaves is little: one measure alone would miss most of it.
-    fused, chips = replace(matcher, settings=SimilaritySettings()), len(places.centres)
+    fused = replace(matcher, settings=SimilaritySettings())
     # Another input leaves something else of the reference.
     once = replace(context, memo=None)
 

@@ -68,7 +68,7 @@ _LEAST_PART = 0.05
 # along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py). Smoother ones
 # are as ground is, and pass (suite attacks, soft pattern noise).
 _REDUCTION, _FURTHER = 4, 2
-_GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
+GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
 # Where a transform has what is the same lie as nothing drawn does, less shows one ground. Of 12
@@ -183,7 +183,16 @@ class Sameness:
         pixels, by light and season.
         """
         is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
-        return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
+        return self.ground >= GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
+
+    @property
+    def is_of_one_sensor(self) -> bool:
+        """Whether coarse pixels vary alike as those of one sensor's images of one ground.
+
+        As many as of what is left. Despeckled radar images of towns and a camera's have up to 13 %,
+        two cameras' 33 % and more where such towns are looked for (suites sharpness and one_grid).
+        """
+        return self.coarse_area >= GROUND_SHARE and not self.is_finer_than_ground
 
     @property
     def leaves_ground(self) -> bool:
@@ -193,12 +202,12 @@ class Sameness:
     @property
     def varies_as_ground(self) -> bool:
         """Whether as much as of one ground varies alike, or follows in other colours."""
-        return self.has_one_ground or self.related >= _GROUND_SHARE
+        return self.has_one_ground or self.related >= GROUND_SHARE
 
     @property
     def has_one_ground(self) -> bool:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
-        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
+        return self.ground >= GROUND_SHARE and not self.is_finer_than_ground
 
 
 _NO_WINDOWS = np.zeros((4, 3), int)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...masks.used import GROUND
+from ...similarity.in_common import GROUND_SHARE
 from ..evidence import RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
@@ -49,10 +50,12 @@ def _surface_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 
 def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
-    points = evidence.held_out
+    points, rest = evidence.held_out, evidence.surveys.rest
     if evidence.mask.is_ground or not evidence.scene.may_be_town:
         return None
     if points.agreeing >= _CLEAR_SHARE * points.total:
+        return None
+    if rest is not None and rest.shared.is_of_cameras:
         return None
     return (
         f"only {points.agreeing} of {points.total} check points agree, as roofs may, and an image "
@@ -83,7 +86,8 @@ SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "town matched whole",
         f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
-        "town, and not its ground alone was matched",
+        f"town, less than {GROUND_SHARE:.0%} of coarse pixels vary alike, and not the ground alone "
+        "was matched",
         "suite city",
         f"if it is a town, give the radar image unfiltered; {ON_GROUND}",
         _town_matched_whole,
