@@ -23,7 +23,7 @@ _LARGEST_PX = 20.0
 _TOO_SMALL = "oo-lake-bands"
 
 # What is made of a drawn shift, (col, row).
-_PLACES: dict[str, Callable[[FloatArray], FloatArray]] = {
+PLACES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "where they belong": np.zeros_like,
     "off by whole pixels": np.rint,
     "off by fractions": np.copy,
@@ -37,14 +37,18 @@ class OneGridCase:
     scene: Scene
     place: str
 
+    @property
+    def shift_px(self) -> FloatArray:
+        """How far off the input is, (col, row)."""
+        return PLACES[self.place](self.scene.offset_px((_LARGEST_PX / 2, _LARGEST_PX)))
+
     def run(self, workers: int | None) -> Outcome:
         """Write the pair, register it and judge the result."""
-        shift = _PLACES[self.place](self.scene.offset_px((_LARGEST_PX / 2, _LARGEST_PX)))
         with tempfile.TemporaryDirectory() as folder:
             return attempt(
                 f"{self.scene.name}, {self.place}",
                 self.scene.group,
-                write_offset(self.scene.pair(Path(folder)), shift, Path(folder)),
+                write_offset(self.scene.pair(Path(folder)), self.shift_px, Path(folder)),
                 workers,
                 search_radius=search_radius_m(_LARGEST_PX),
             )
@@ -56,11 +60,11 @@ def run(settings: Settings) -> SuiteResult:
     scenes = [Scene(case, settings.cache) for case in real]
     if settings.quick:
         scenes = list({scene.group: scene for scene in scenes}.values())
-    cases = [OneGridCase(scene, place) for place in _PLACES for scene in scenes]
+    cases = [OneGridCase(scene, place) for place in PLACES for scene in scenes]
     outcomes = run_cases(cases, settings.jobs)
     by_place = {
         place: [o for case, o in zip(cases, outcomes, strict=True) if case.place == place]
-        for place in _PLACES
+        for place in PLACES
     }
     by_pair = {
         scene.name: [o for case, o in zip(cases, outcomes, strict=True) if case.scene is scene]
