@@ -226,3 +226,14 @@ class TestLattice:
     def test_small_grids_have_a_place_a_pixel(self) -> None:
         px = spread_over(Grid(PIXEL_COORDINATES, None, 3, 2))
         assert px.tolist() == [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
+
+
+def test_a_way_back_may_count_longitudes_the_other_way() -> None:
+    """Both images lie across the antimeridian, one of them counted from the east."""
+    west, east = (
+        Grid(Affine(1e-3, 0, start, 0, -1e-3, 0.05), LONLAT, 100, 100)
+        for start in (179.95, -180.05)
+    )
+    way = [Leg("back.json", shifted(0.0, 0.0, east, LONLAT), reverse=True)]
+    found = consistency(Leg("t.json", shifted(0.0, 0.0, west, LONLAT)), way)
+    assert found.in_pixels.largest < 1e-6

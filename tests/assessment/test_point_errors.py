@@ -57,6 +57,15 @@ class TestPointErrors:
         expected = 6_371_000 * math.radians(1e-4) * math.cos(math.radians(45.135))
         np.testing.assert_allclose(found.in_metres.bias, [expected, 0], rtol=1e-3, atol=1e-6)
 
+    @pytest.mark.parametrize("turn", [0.0, 360.0, -360.0])
+    def test_metres_across_the_antimeridian(self, turn: float) -> None:
+        """Points of a table may count longitudes the other way round."""
+        grid = Grid(Affine(1e-3, 0, 179.95, 0, -1e-3, 0.05), LONLAT, 100, 100)
+        transform, xy = shifted(0.0, 0.0, grid, LONLAT), grid.pixel_to_map([[70.0, 20.0]])
+        found = PointErrors.of(transform, xy + [turn, 0], transform(xy) + [1.0, 0.0])
+        assert found.error_px[0] == pytest.approx([1.0, 0.0], abs=1e-6)
+        assert found.in_metres.bias == pytest.approx([111.2, 0.0], rel=2e-3, abs=1e-6)
+
     def test_a_stretch_shows_in_metres_where_the_registered_image_has_the_point(self) -> None:
         """The input claims all distances half as long: its pixel is worth two on the map."""
         model = PolynomialModel(

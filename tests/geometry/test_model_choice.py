@@ -114,3 +114,8 @@ def test_neighbours_share_a_fold_and_each_line_holds_all() -> None:
 def test_points_on_one_spot_or_line_have_folds() -> None:
     assert len(left_out_blocks(np.ones((4, 2)))) == 1
     assert len(left_out_blocks(np.column_stack([np.arange(20.0), np.ones(20)]))) == 5
+
+
+def test_a_few_points_are_not_all_left_out_at_once() -> None:
+    """All three lie in blocks that share a fold where there are many points."""
+    assert len(left_out_blocks(np.array([[10.0, 10.0], [990.0, 700.0], [500.0, 990.0]]))) == 3

@@ -195,3 +195,16 @@ def test_terrain_models_must_cover_the_overlap() -> None:
 def test_a_terrain_model_without_a_crs_has_no_place_on_a_map_with_one() -> None:
     with pytest.raises(GeoreferencingError, match="only one of"):
         Terrain.open(Raster(heights(hill), GRID.transform), None, UTM, REGION)
+
+
+@pytest.mark.parametrize("turn", [0.0, 360.0])
+def test_terrain_models_may_count_longitudes_from_zero(turn: float) -> None:
+    """A map at 100° west, heights in 0° to 360°, as climate models have them."""
+    lon_lat, rows = CRS.from_epsg(4326), np.arange(240, dtype=np.float32)
+    own = Affine(0.005, 0, -100.5 + turn, 0, -0.005, 45.5)
+    raster = Raster(np.tile(rows[:, None], (1, 300)), own, lon_lat)
+    grid = Grid(Affine(0.005, 0, -100.2, 0, -0.005, 45.0), lon_lat, 60, 40)
+    of = Terrain.open(raster, None, lon_lat, (-100.2, 44.8, -99.9, 45.0))
+    of.require_cover(grid, grid, lon_lat)
+    found = of.ground_m(np.array([[-100.1, 44.9], [-100.0, 44.85]]))
+    assert found == pytest.approx([119.5, 129.5], abs=0.01)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,12 @@ class TestReferenceAcrossTheAntimeridian:
         transform, xy, px = self.transform(turn)
         np.testing.assert_allclose(transform(xy), px, atol=1e-3)
         np.testing.assert_allclose(transform.inverse(px), xy, atol=1e-8)
+
+    @pytest.mark.parametrize("kind", ["affine", "polynomial2"])
+    def test_positions_may_count_longitudes_the_other_way(self, kind: str) -> None:
+        fitted, xy, px = self.transform(180.0)
+        transform = replace(fitted, model=fit_model(kind, xy, fitted.model(xy)))
+        np.testing.assert_allclose(transform(xy - [360, 0]), px, atol=1e-3)
 
     def test_positions_of_other_maps_are_taken_there(self) -> None:
         transform, xy, px = self.transform(180.0)

@@ -5,15 +5,19 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import fiona
+import numpy as np
 import pytest
-from raster_files import UTM
+from affine import Affine
+from raster_files import utm_grid
 from rasterio.crs import CRS
 
 from groundtie.errors import GeoreferencingError, VectorLayerError
 from groundtie.geometry import layer_reader, vector_layers
 from groundtie.geometry.vector_layers import read_vector_layer
+from groundtie.rasters.grid import Grid
 
 RING = [(9.0, 45.0), (9.1, 45.0), (9.1, 45.1), (9.0, 45.0)]
 
@@ -48,10 +52,29 @@ def test_what_a_layer_holds(layer: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     first, second = found.features
     assert first["geometry"]["coordinates"] == [[list(corner) for corner in RING]]
     assert (first["properties"]["class"], second["geometry"]) == (3, None)
-    (moved,) = found.on_map(UTM).features
+    (moved,) = found.on_map(utm_grid(10, 10)).features
     assert moved["geometry"]["coordinates"][0][0] == pytest.approx((500_000, 4_982_950), abs=5)
     with pytest.raises(GeoreferencingError, match="only one of"):
-        found.on_map(None)
+        found.on_map(Grid(Affine.identity(), None, 10, 10))
+
+
+@pytest.mark.parametrize(
+    ("kind", "nest"),
+    [("Polygon", lambda ring: [ring]), ("MultiPolygon", lambda ring: [[ring]]), ("Point", None)],
+)
+def test_longitudes_are_counted_as_the_grids_are(tmp_path: Path, kind: str, nest: Any) -> None:
+    """West of the antimeridian the grid goes on beyond 180°."""
+    ring = [[-179.98, 0.0], [-179.96, 0.0], [-179.96, 0.01], [-179.98, 0.0]]
+    geometry = {"type": kind, "coordinates": ring[0] if nest is None else nest(ring)}
+    path = tmp_path / "a.geojson"
+    feature = {"type": "Feature", "geometry": geometry, "properties": {"a": 1}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    grid = Grid(Affine(0.001, 0, 179.95, 0, -0.001, 0.05), CRS.from_epsg(4326), 100, 100)
+    (found,) = read_vector_layer(path).on_map(grid).features
+    first = np.ravel(found["geometry"]["coordinates"])[:2]
+    assert first == pytest.approx([180.02, 0.0])
+    near = Grid(Affine(0.001, 0, -179.99, 0, -0.001, 0.05), CRS.from_epsg(4326), 100, 100)
+    assert read_vector_layer(path).on_map(near).features[0]["geometry"] == geometry
 
 
 def test_collections_are_taken_apart_with_their_attributes(tmp_path: Path) -> None:
@@ -67,7 +90,7 @@ def test_collections_are_taken_apart_with_their_attributes(tmp_path: Path) -> No
         for number, geometry in enumerate([outer, empty, area])
     ]
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    found = read_vector_layer(path).on_map(UTM)
+    found = read_vector_layer(path).on_map(utm_grid(10, 10))
     kinds = [(one["geometry"]["type"], one["properties"]["number"]) for one in found.features]
     assert kinds == [("Point", 0), ("Polygon", 0), ("Polygon", 2)]
     first, last = (found.features[index]["geometry"]["coordinates"] for index in (1, 2))

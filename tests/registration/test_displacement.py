@@ -90,15 +90,15 @@ def test_without_georeferencing_it_is_in_pixels(
     shift = PolynomialModel("translation", Frame(Affine.identity()), np.array([[3.0, -2.0]]))
     estimate = replace(evidence.estimate, transform=Transform(shift, None, own))
     like, path = registration.pair.reference.source, tmp_path / "d.tif"
-    # Larger pixels of the same lattice are moved by fewer of them.
-    for lattice, size in ((own, 1.0), (own.window(5, 4, 90, 80), 1.0), (own.scaled(2.0), 2.0)):
+    # The file's coordinates are the image's pixels, however large those are that were matched.
+    for lattice in (own, own.window(5, 4, 90, 80), own.scaled(2.0)):
         write_displacement(replace(evidence, grid=lattice, estimate=estimate), like, path)
         with rasterio.open(path) as raster:
             dx, dy, _ = raster.read()
             assert raster.units == ("px",) * 3 and "down" in raster.descriptions[1]
         known = np.isfinite(dx)
-        np.testing.assert_allclose(dx[known], -3.0 / size, rtol=1e-6)
-        np.testing.assert_allclose(dy[known], 2.0 / size, rtol=1e-6)
+        np.testing.assert_allclose(dx[known], -3.0, rtol=1e-6)
+        np.testing.assert_allclose(dy[known], 2.0, rtol=1e-6)
 
 
 def test_a_refused_registration_leaves_none(

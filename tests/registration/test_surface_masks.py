@@ -21,6 +21,7 @@ from groundtie.masks.scene import Scene
 from groundtie.masks.used import REFERENCE, SURFACE
 from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
+from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.asked import asked_surface
 from groundtie.registration.masks import Masked
@@ -28,6 +29,7 @@ from groundtie.registration.scene import SceneInfo, scene_of
 from groundtie.registration.specification import BOTH, INPUT, NEITHER, StatedSurface
 from groundtie.registration.surface_masks import (
     ModelFit,
+    fit_of_images,
     fitted_ground,
     with_surface_mask,
 )
@@ -200,3 +202,17 @@ def test_a_model_needs_both_views_and_a_view_a_model(city: Path, tmp_path: Path)
         view = "radar azimuth=90 incidence=40"
         asked_surface({**given, "surface_model": None, "views": view}, "input")
     assert asked_surface({**given, "surface_model": None}, "input") is None
+
+
+def test_decibels_fit_a_model_as_their_amplitudes_do() -> None:
+    random, valid = np.random.default_rng(0), np.ones((200, 200), bool)
+    rendered = np.exp(random.normal(3.0, 1.0, valid.shape)).astype(np.float32)
+    seen = np.roll(rendered, (3, -2), (0, 1)) * np.exp(random.normal(0, 0.5, valid.shape))
+    decibels = 20 * np.log10(seen / seen.max())
+    amplitude, level = (
+        fit_of_images(Patch(rendered, valid), Patch(values.astype(np.float32), valid))
+        for values in (seen, decibels)
+    )
+    assert amplitude.offset_px == level.offset_px == (-2, 3)
+    assert level.correlation == pytest.approx(amplitude.correlation, abs=0.05)
+    assert level.correlation > 0.8

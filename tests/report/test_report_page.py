@@ -122,6 +122,10 @@ def test_metres_in_degrees_are_those_along_each_axis() -> None:
 def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:
     transform = transform_of(ungeoreferenced, np.array([7.0, -4.0]))
     assert Correction.of(transform, ungeoreferenced.grid).direction == "7.0 px left, 4.0 px down"
+    # Where larger pixels are matched, all lengths are in these.
+    coarse = Correction.of(transform, ungeoreferenced.grid.scaled(2.0))
+    assert coarse.centre_px == pytest.approx(np.hypot(3.5, 2.0))
+    assert coarse.direction == "3.5 px left, 2.0 px down"
     nothing = Transform.nominal(None, ungeoreferenced.input.source.grid)
     assert Correction.of(nothing, ungeoreferenced.grid).direction == ""
 

@@ -36,12 +36,14 @@ VERDICT = Verdict(True, "good", fit_points=7, check_rmse_m=4.0, ce90_m=2.5)
 GRID = utm_grid(30, 20)
 
 
-def item(tmp_path: Path, grid: Grid = GRID, name: str = "s2_20240506.tif") -> dict[str, object]:
+def item(
+    tmp_path: Path, grid: Grid = GRID, name: str = "s2_20240506.tif", output: str = "moved.cog.tif"
+) -> dict[str, object]:
     path = write_raster(tmp_path / name, np.ones((20, 30), np.uint8), GRID)
     transform = Transform(shift_on_map(1.0, 2.0), GRID.crs, GRID)
     with open_raster(path) as source:
-        output = tmp_path / "out" / "moved.cog.tif"
-        return stac_item(source, output, grid, tmp_path / "reports", quality_of(VERDICT, transform))
+        path = tmp_path / "out" / output
+        return stac_item(source, path, grid, tmp_path / "reports", quality_of(VERDICT, transform))
 
 
 def test_the_fields_are_those_of_the_extensions(tmp_path: Path) -> None:
@@ -148,3 +150,10 @@ def test_the_numbers_of_a_report_are_an_item_that_tools_read(
     with rasterio.open(tmp_path / "moved.tif") as raster:
         assert fields["proj:transform"] == list(raster.transform[:6])
         assert fields["proj:shape"] == list(raster.shape)
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".TIFF", ".cog.tif", ".vrt"])
+def test_the_id_is_the_name_with_all_its_dots(tmp_path: Path, suffix: str) -> None:
+    """As scenes of HLS have them: cut at the first dot, all would have one id."""
+    name = "HLS.S30.T32TPS.2024127T102031.v2.0"
+    assert item(tmp_path, output=name + suffix)["id"] == name

@@ -7,7 +7,7 @@ import pytest
 
 from groundtie.errors import TooFewPointsError
 from groundtie.sensor.adjustment import Control, adjust
-from groundtie.sensor.bias import KINDS, TERMS, Bias, design
+from groundtie.sensor.bias import KINDS, SHIFT, TERMS, Bias, design
 
 SIZE = (6000, 5000)
 COEFFICIENTS = np.array([[30.0, -12.0], [6.0, -5.0], [4.0, 7.0]])
@@ -140,3 +140,24 @@ def test_residuals_as_delivered_are_what_was_found() -> None:
     points = control("shift", noise_px=1e-6)
     np.testing.assert_allclose(points.residuals_px(None), [[30.0, -12.0]] * 60, atol=1e-4)
     assert len(points) == 60
+
+
+@pytest.mark.parametrize("far_px", [0.0, 1e4, 1e8])
+def test_one_point_anywhere_makes_no_other_agree(far_px: float) -> None:
+    """As of coordinates that are swapped: beyond the image, it is as wrong as any."""
+    kept = 0
+    for seed in range(20):
+        points = control(SHIFT, 12, noise_px=0.8, seed=seed)
+        points.found_px[0] += [25.0, 0.0]
+        points.found_px[1] += far_px
+        kept += int(adjust(points, SHIFT).used[0])
+    assert kept <= 2
+
+
+def test_a_model_that_hangs_on_points_side_by_side_is_refused() -> None:
+    """Seven of nine points lie in one corner: without them two are left."""
+    random = np.random.default_rng(0)
+    px = np.vstack([random.uniform(0, 100, (7, 2)), [[5900, 100], [3000, 4900]]])
+    points = Control(px, px + truth("affine")(px), np.tile(np.eye(2) * 0.04, (9, 1, 1)), SIZE)
+    with pytest.raises(TooFewPointsError, match="side by side"):
+        adjust(points, "affine")

@@ -17,7 +17,7 @@ from rasterio.control import GroundControlPoint
 from rasterio.crs import CRS
 from rpc_models import camera_rpc, write_dem, write_positions
 
-from groundtie.errors import OutputError, TransformFileError
+from groundtie.errors import GeoreferencingError, OutputError, TransformFileError
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.rasters.grid import LON_LAT, Grid, reproject
 from groundtie.rasters.reading import open_raster
@@ -264,6 +264,16 @@ def test_other_formats_are_not_written(tmp_path: Path, located: tuple[Orientatio
         some_points(located[0]).write(tmp_path / "a.xls", *located)
 
 
+def test_a_point_that_the_rpcs_cannot_see_is_named(located: tuple[Orientation, Grid]) -> None:
+    """As of an easting with a digit too many; it may not make the others disagree."""
+    points = some_points(located[0])
+    points.reference_xy[3, 0] *= 1000
+    with pytest.raises(GeoreferencingError, match="cannot place 1 of 12 points, the first at"):
+        points.seen_by(RPC, located[1].size)
+    rejected = points.reject(np.arange(12) == 3, "by hand")
+    assert np.isnan(rejected.seen_by(RPC, located[1].size).expected_px).any(axis=1).sum() == 1
+
+
 class TestFormatsOfOthers:
     """The same points, as other programs write them."""
 
@@ -347,6 +357,12 @@ class TestFormatsOfOthers:
         [
             ("a.pts", "; projection info = {State Plane, NAD-27}\n1 2 3 4\n", "is none of UTM"),
             ("a.pts", "1 2 3 4\n", "is none of UTM"),
+            (
+                "a.pts",
+                "; projection info = {UTM, 17, North, WGS-84, units=Feet}\n1 2 3 4\n",
+                "units=feet must be Meters or Degrees",
+            ),
+            ("a.csv", "reference_x,reference_y,reference_x\n1,2,3\n", "stands twice"),
             ("a.pts", "; only comments\n", "lines of map x, y"),
             ("a.pts", "1 2 three 4\n", "could not convert"),
             ("a.geojson", '{"features": [{"properties": {"ji": [1]}}]}', "cannot read the ground"),

@@ -62,7 +62,7 @@ class Leg:
             Which these are, shape (n,).
         """
         own = self.transform.input_grid
-        px = own.map_to_pixel(xy) if self.reverse else self.transform(xy)
+        px = own.map_to_pixel(own.to_own_map(xy, own.crs)) if self.reverse else self.transform(xy)
         inside = own.contains(px)
         px = px[inside]
         return (self.transform.inverse(px) if self.reverse else own.pixel_to_map(px)), inside

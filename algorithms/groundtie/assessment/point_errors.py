@@ -15,7 +15,7 @@ from ..geometry.rows import Rows
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..matching.check import CHECK_RADIUS_PX
-from ..rasters.grid import FloatArray, Grid, finite, metres_per_unit_at
+from ..rasters.grid import FloatArray, Grid, finite, metres_per_unit_at, near_longitude
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
@@ -68,7 +68,8 @@ class PointErrors(Rows):
         px = np.asarray(input_px, float).reshape(-1, 2)
         error_m = None
         if transform.crs is not None or transform.input_grid.is_georeferenced:
-            error_m = (transform.inverse(px) - xy) * _metres_per_unit(transform, xy)
+            moved = near_longitude(transform.inverse(px) - xy, 0.0, transform.crs)
+            error_m = moved * _metres_per_unit(transform, xy)
         every = np.ones(len(px), bool)
         return cls(px, px - transform(xy), every, every, error_m)
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import GeoreferencingError
 from ..geometry.judging import SMALLEST_PX
 from ..rasters.atomic import write_csv, writing
 from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, near_longitude, reproject
@@ -48,13 +47,7 @@ class SensorErrors:
         moved = near_longitude(moved, 0.0, points.crs)
         error_px = points.input_px - rpc.project(points.lon_lat, points.height_m)
         placed = np.isfinite(np.hstack([moved, error_px])).all(axis=1)
-        if not placed.all():
-            raise GeoreferencingError(
-                f"the RPCs cannot place {np.sum(~placed)} of {len(points)} points, the first at "
-                f"{points.reference_xy[~placed][0].tolist()} on the map and "
-                f"{points.input_px[~placed][0].tolist()} in the image: check these positions and "
-                "the points' CRS"
-            )
+        points.require_placed(np.asarray(placed))
         per_unit = metres_per_unit_at(points.reference_xy.mean(axis=0), points.crs)
         return cls(error_px, moved * per_unit)
 
@@ -69,13 +62,13 @@ class SensorErrors:
 
 def table_lines(errors: dict[str, SensorErrors]) -> list[str]:
     """Return the errors of each point, and their statistics, as lines of text."""
-    head = "point" + "".join(f"  {name + ' x':>10}{'y (m)':>9}" for name in errors)
+    head = "point " + "".join(f"  {name + ' x':>10}{'y (m)':>9}" for name in errors)
     lines = [head]
     count = len(next(iter(errors.values())).error_m)
 
     def row(label: str, values: list[FloatArray]) -> str:
         cells = "".join(f"  {x:10.2f}{y:9.2f}" for x, y in values)
-        return f"{label:<5}{cells}"
+        return f"{label:<6}{cells}"
 
     for i in range(count):
         lines.append(row(str(i + 1), [each.error_m[i] for each in errors.values()]))

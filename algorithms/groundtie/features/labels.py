@@ -162,7 +162,7 @@ def layer_labels(
     GeoreferencingError
         Only one of layer and image has a CRS.
     """
-    layer = read_vector_layer(path).on_map(grid.crs)
+    layer = read_vector_layer(path).on_map(grid)
     if field not in layer.fields:
         names = ", ".join(layer.fields) or "none"
         raise VectorLayerError(f"{path} has no attribute {field!r}; it has: {names}")
@@ -184,8 +184,17 @@ def layer_labels(
 
 
 def _is_one_of(value: Any, texts: Sequence[str]) -> bool:
-    # Numbers of a layer may be 1 or 1.0.
-    return f"{value:g}" in texts if isinstance(value, float) else str(value) in texts
+    """Whether a value is among those that texts state: numbers of a layer may be 1 or 1.0."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value) in texts
+    return any(value == _number(text) for text in texts)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def labelled_points(

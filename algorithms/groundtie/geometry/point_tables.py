@@ -35,10 +35,13 @@ def table_rows(lines: Iterable[str], needed: Sequence[str]) -> list[Row]:
     KeyError
         One of the needed columns is missing in the first line, whether or not rows follow.
     ValueError
-        A row has more fields than the first line, other than empty ones.
+        A row has more fields than the first line, other than empty ones, or that has a name twice.
     """
     reader = csv.DictReader(lines)
     rows = [dict(row) for row in reader]
+    names = [name for name in reader.fieldnames or () if name]
+    if len(set(names)) < len(names):
+        raise ValueError("a column's name stands twice in the first line")
     for name in needed:
         if name not in (reader.fieldnames or needed):
             raise KeyError(name)

@@ -20,6 +20,7 @@ from ..rasters.grid import (
     apply_affine,
     compose,
     mesh,
+    near_longitude,
     reproject,
     require_both_or_none,
 )
@@ -103,12 +104,12 @@ class Terrain:
             Heights are unknown at a part of it.
         """
         xy = grid.pixel_to_map(grid.lattice(_ASKED))
-        xy = xy[within.contains(within.map_to_pixel(reproject(xy, crs, within.crs)))]
+        xy = xy[within.covers(within.to_own_map(xy, crs))]
         for surface in (self.ground, self.assumed):
             if surface is None:
                 continue
             own = surface.source.grid
-            known = own.contains(own.map_to_pixel(reproject(xy, crs, own.crs)))
+            known = own.contains(_pixels_of(own, xy, crs))
             if not known.all():
                 raise NoOverlapError(
                     f"{surface.source.path} covers only {100 * known.mean():.0f} % of where the "
@@ -125,6 +126,12 @@ class Terrain:
         }
 
 
+def _pixels_of(grid: Grid, xy: FloatArray, crs: CRS | None) -> FloatArray:
+    """Return pixels of a grid, longitudes counted as it does: from -180° or from 0°, (n, 2)."""
+    middle = grid.pixel_to_map([grid.centre_px])[0, 0]
+    return grid.map_to_pixel(near_longitude(reproject(xy, crs, grid.crs), middle, grid.crs))
+
+
 def _surface(
     raster: Any, crs: CRS | None, region: tuple[float, float, float, float]
 ) -> RasterSurface:
@@ -136,7 +143,7 @@ def _surface(
     last = np.array(grid.size) - 1
 
     def to_px(xy: FloatArray) -> FloatArray:
-        px = grid.map_to_pixel(reproject(xy, crs, grid.crs))
+        px = _pixels_of(grid, xy, crs)
         asked = np.all((xy >= [left, bottom]) & (xy <= [right, top]), axis=1)
         return np.where(asked[:, None], np.clip(px, 0, last), px)
 

@@ -72,13 +72,13 @@ class Transform:
             They are of another shape.
         """
         positions = as_positions(xy)
-        moved = self.model(positions.reshape(-1, 2))
+        moved = self.model(self._at_model(positions.reshape(-1, 2)))
         nominal = self.input_grid.to_own_map(moved, self.crs)
         return self.input_grid.map_to_pixel(nominal).reshape(positions.shape)
 
     def of_map(self, crs: CRS | None) -> PointFunction:
         """Return the function from positions (n, 2) on a map of another CRS to input pixels."""
-        return lambda xy: self(self._at_model(reproject(xy, crs, self.crs)))
+        return lambda xy: self(reproject(xy, crs, self.crs))
 
     def nominal_xy(self, px: ArrayLike) -> FloatArray:
         """Return the nominal reference map positions of input pixels (col, row), (..., 2).
@@ -236,6 +236,8 @@ def model_from_json(
         return ThinPlateSpline(kind, frame, knots, weights, _pairs(values["affine"], 3))
     if kind == TERRAIN:
         return TerrainModel.from_json(values, frame, crs, folder)
+    if kind not in DEGREE:
+        raise ValueError(f"there is no model {kind!r:.60}")
     terms = (DEGREE[kind] + 1) * (DEGREE[kind] + 2) // 2
     return PolynomialModel(kind, frame, _pairs(values["coefficients"], terms))
 

@@ -17,12 +17,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
 from rasterio.warp import transform_geom
 
 from ..errors import GeoreferencingError, VectorLayerError, raised_by
-from ..rasters.grid import require_both_or_none, require_map
+from ..rasters.grid import Grid, full_turn, require_both_or_none, require_map
 from . import layer_reader
 
 # The layers that masks and tie points come from are read in seconds.
@@ -50,10 +51,11 @@ class VectorLayer:
     fields: tuple[str, ...]
     features: tuple[dict[str, Any], ...]
 
-    def on_map(self, crs: CRS | None) -> VectorLayer:
-        """Return the features that have a geometry, in the CRS of a map.
+    def on_map(self, grid: Grid) -> VectorLayer:
+        """Return the features that have a geometry, on the map of a grid.
 
-        Those of a collection become features of their own, with its properties.
+        Those of a collection become features of their own, with its properties. Of a map with
+        longitudes, they are counted as the grid's are.
 
         Raises
         ------
@@ -62,6 +64,7 @@ class VectorLayer:
         VectorLayerError
             A geometry cannot be taken to the map.
         """
+        crs = grid.crs
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
         located = [
             {**feature, "geometry": geometry}
@@ -79,7 +82,38 @@ class VectorLayer:
                 {**item, "geometry": geometry}
                 for item, geometry in zip(located, moved, strict=True)
             ]
+        longitude, turn = grid.pixel_to_map([grid.centre_px])[0, 0], full_turn(crs)
+        if turn is not None:
+            located = [
+                {**item, "geometry": _near_longitude(item["geometry"], longitude, turn)}
+                for item in located
+            ]
         return replace(self, crs=crs, features=tuple(located))
+
+
+def _near_longitude(geometry: Any, longitude: float, turn: float) -> Any:
+    """Return a geometry whose middle is not more than half a turn from a longitude."""
+    coordinates = geometry["coordinates"]
+    seen = _longitudes(coordinates)
+    turns = np.rint(((min(seen) + max(seen)) / 2 - longitude) / turn) if seen else 0
+    return {**geometry, "coordinates": _moved(coordinates, -turns * turn)} if turns else geometry
+
+
+def _is_position(coordinates: Any) -> bool:
+    return len(coordinates) > 0 and isinstance(coordinates[0], int | float)
+
+
+def _longitudes(coordinates: Any) -> list[float]:
+    """Return those of all positions, however deep GeoJSON nests them."""
+    if _is_position(coordinates):
+        return [coordinates[0]]
+    return [x for part in coordinates for x in _longitudes(part)]
+
+
+def _moved(coordinates: Any, by: float) -> Any:
+    if _is_position(coordinates):
+        return [coordinates[0] + by, *coordinates[1:]]
+    return [_moved(part, by) for part in coordinates]
 
 
 def simple_geometries(geometry: Any) -> list[Any]:

@@ -46,7 +46,10 @@ class LayerMask:
     is_outside: bool = False
 
     def select(self, window: Window) -> Selection:
-        """Return which pixels of a window take part: those whose centres it covers."""
+        """Return which pixels of a window take part: those that it covers.
+
+        Of areas those whose centres lie in them; of lines all that these touch, and so many around.
+        """
         around = window.widened(self.reach_px)
         along = grown(self._drawn(self.lines, around), self.reach_px)[window.slices_in(around)]
         covered = self._drawn(self.areas, window) | along
@@ -104,7 +107,7 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     GeoreferencingError
         Only one of layer and scene has a CRS.
     """
-    layer = read_vector_layer(path).on_map(scene.grid.crs)
+    layer = read_vector_layer(path).on_map(scene.grid)
     every = [feature["geometry"] for feature in layer.features]
     areas, lines = (
         tuple(geometry for geometry in every if geometry["type"] in kinds)

@@ -104,7 +104,7 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
     GeoreferencingError
         Only one of layer and grid has a CRS.
     """
-    layer = read_vector_layer(path).on_map(grid.crs)
+    layer = read_vector_layer(path).on_map(grid)
     field = next((name for name in layer.fields if name.lower() in _HEIGHT_FIELDS), None)
     if field is None:
         has = ", ".join(layer.fields) or "none"

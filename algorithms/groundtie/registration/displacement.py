@@ -50,12 +50,11 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
     grid = matching.on_same_map(place, cols, rows)
     px = mesh(np.arange(cols), np.arange(rows))
     xy = grid.pixel_to_map(px)
-    if matching.is_georeferenced:
-        t, per_unit = matching.transform, matching.metres_per_unit
-        x, y = values[:2].copy()
-        values[0] = (t.a * x + t.b * y) * per_unit[0]
-        values[1] = (t.d * x + t.e * y) * per_unit[1]
-        values[2] *= max(matching.pixel_sides_m)
+    t, per_unit = matching.transform, matching.metres_per_unit
+    x, y = values[:2].copy()
+    values[0] = (t.a * x + t.b * y) * per_unit[0]
+    values[1] = (t.d * x + t.e * y) * per_unit[1]
+    values[2] *= max(matching.pixel_sides_m)
     shown = transform.input_grid.contains(transform(xy)).reshape(rows, cols)
     return np.where(shown, values, np.nan), grid
 

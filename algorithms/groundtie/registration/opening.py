@@ -112,11 +112,12 @@ def pair_images(
     )
     reach_m = images.limits.radius
     if radius_m is not None and radius_m > reach_m:
+        unit = "m" if grid.is_georeferenced else "px"
         context.update(
             0.0,
-            f"warning: a search radius of {radius_m:.6g} m reaches beyond the images: all shifts "
-            f"up to {reach_m:.4g} m are searched, which may take minutes; a smaller one is faster "
-            "and safer",
+            f"warning: a search radius of {radius_m:.6g} {unit} reaches beyond the images: all "
+            f"shifts up to {reach_m:.4g} {unit} are searched, which may take minutes; a smaller "
+            "one is faster and safer",
         )
     for note in images.notes():
         context.update(0.0, note)

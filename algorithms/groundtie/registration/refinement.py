@@ -19,7 +19,7 @@ from ..geometry.misses import Misses
 from ..kinds import plain
 from ..masks.used import MaskUsed
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
-from ..sensor.adjustment import LEAST_REACH_PX, Adjustment, Control, adjust
+from ..sensor.adjustment import Adjustment, Control, adjust, reach_px
 from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints
 from ..sensor.height_check import HeightCheck, check_heights
@@ -95,7 +95,7 @@ class RefinementEvidence:
     @cached_property
     def held_out(self) -> Agreement:
         """How points that took no part agree with the refined RPCs."""
-        name, _, after = self._held
+        name, _, after = self.held
         nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
         return Agreement.of(
             name,
@@ -109,13 +109,13 @@ class RefinementEvidence:
     @property
     def before(self) -> Statistics:
         """Errors at the held-out inliers by the RPCs as delivered, px."""
-        _, points, _ = self._held
+        _, points, _ = self.held
         return Statistics.of(points.residuals_px(None)[self._error.check.mixture.inliers])
 
     @property
     def after(self) -> Statistics:
         """Errors at the held-out inliers by the refined RPCs, px."""
-        _, _, after = self._held
+        _, _, after = self.held
         return Statistics.of(after[self._error.check.mixture.inliers])
 
     def summary(self) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class RefinementEvidence:
         return self.control.found_px[self.adjustment.used]
 
     @cached_property
-    def _held(self) -> tuple[str, Control, FloatArray]:
+    def held(self) -> tuple[str, Control, FloatArray]:
         """What took no part, in words, as points, and by how much the bias misses it, (n, 2)."""
         if self.check is None or len(self.check) < FEWEST_CHECK_POINTS:
             return LEFT_OUT, self.control, self.adjustment.left_out_px
@@ -137,8 +137,9 @@ class RefinementEvidence:
 
     @cached_property
     def _error(self) -> ErrorModel:
-        _, points, after = self._held
-        reach = max(int(np.ceil(np.hypot(*after.T).max(initial=0.0))), LEAST_REACH_PX)
+        _, points, after = self.held
+        farthest = float(np.hypot(*after.T).max(initial=0.0))
+        reach = int(np.ceil(reach_px(farthest, self.control.size)))
         tolerance = max(TOLERANCE_PX, self.max_error_px)
         misses = Misses(points.expected_px, after, reach, self.max_error_px, tolerance)
         return ErrorModel(self.adjustment.fold_biases, misses, self.common)
@@ -251,14 +252,11 @@ class RefinedRpc:
     def residuals(self) -> PointErrors:
         """Return by how much the refined RPCs miss the points, in the image.
 
-        Without check points, those are shown for them that points have when they are left out.
+        Without enough check points, those are shown for them that points have when left out.
         """
         control, adjustment = self.evidence.control, self.adjustment
-        fitted, held_out = control.residuals_px(adjustment.bias), self.evidence.check
-        if held_out is None:
-            held_out, missed = control, adjustment.left_out_px
-        else:
-            missed = held_out.residuals_px(adjustment.bias)
+        fitted = control.residuals_px(adjustment.bias)
+        _, held_out, missed = self.evidence.held
         return PointErrors(
             np.concatenate([control.found_px, held_out.found_px]),
             np.concatenate([fitted, missed]),

@@ -13,7 +13,7 @@ from ..declaration import given_files
 from ..errors import OutputError, SameFileError
 from ..kinds import GEOTIFF
 from ..progress import Progress
-from ..raster_names import is_only_raster_of_its_name, is_rpc_file_of, rpc_files
+from ..raster_names import file_name, is_only_raster_of_its_name, is_rpc_file_of, rpc_files
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import write_with_geotransform
 from ..rasters.grid import FloatArray
@@ -131,7 +131,7 @@ class RefinementFiles:
         return RefinementReport(
             refined,
             None if found is None else _compared(refined.adjustment.bias, image, found),
-            title=f"RPCs of {Path(refined.path).name}, refined",
+            title=f"RPCs of {file_name(refined.path)}, refined",
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )

@@ -11,6 +11,7 @@ from ..geometry.views import RADAR, View
 from ..kinds import AUTO
 from ..masks.used import INPUT, REFERENCE
 from ..matching.alignment import MODEL_CANDIDATES
+from ..raster_names import file_name
 from ..rasters.rendered import Light
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
@@ -63,7 +64,8 @@ class StatedSurface:
     @property
     def name(self) -> str:
         """What people call the model."""
-        return Path(self.model).name if isinstance(self.model, (str, Path)) else "the surface model"
+        is_file = isinstance(self.model, (str, Path))
+        return file_name(str(self.model)) if is_file else "the surface model"
 
     @property
     def radar(self) -> str:

@@ -89,11 +89,15 @@ def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> 
 
 
 def move_in_words(move: NDArray[np.float64], grid: Grid) -> str:
-    """Return a move in map units along both axes, as "3.0 m east, 1.5 m north"."""
+    """Return a move in map units along both axes, as "3.0 m east, 1.5 m north".
+
+    Without georeferencing in matching pixels, as lengths are.
+    """
     # A map without georeferencing is the pixel lattice, y downwards.
     on_map = grid.is_georeferenced
     ways = (("west", "east"), ("south", "north")) if on_map else (("left", "right"), ("up", "down"))
-    scale, unit = (grid.metres_per_unit, "m") if on_map else ((1.0, 1.0), "px")
+    unit_m = np.array(grid.metres_per_unit)
+    scale, unit = (unit_m, "m") if on_map else (unit_m / grid.pixel_sides_m, "px")
     lengths = [f"{abs(length):.1f}" for length in move * scale]
     parts = [
         f"{text} {unit} {way[int(length > 0)]}"

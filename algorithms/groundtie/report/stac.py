@@ -71,7 +71,7 @@ def stac_item(
         "type": "Feature",
         "stac_version": VERSION,
         "stac_extensions": list(EXTENSIONS),
-        "id": output.name.partition(".")[0],
+        "id": _name_without_suffix(output),
         "geometry": {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
         "bbox": [*places.min(axis=0).tolist(), *places.max(axis=0).tolist()],
         "properties": {
@@ -105,6 +105,12 @@ def _projection(grid: Grid) -> dict[str, Any]:
         "proj:transform": list(grid.transform[:6]),
         "proj:bbox": [*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()],
     }
+
+
+def _name_without_suffix(output: Path) -> str:
+    name = output.name
+    longest = next((end for end in COG_SUFFIXES if name.lower().endswith(end)), output.suffix)
+    return name[: len(name) - len(longest)]
 
 
 def _asset(output: Path, folder: Path) -> dict[str, Any]:

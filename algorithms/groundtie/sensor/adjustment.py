@@ -156,7 +156,10 @@ def _adjust(control: Control, kind: str) -> Adjustment:
     inside = np.flatnonzero(used)
     for block in left_out_blocks(kept.expected_px):
         if (~block).sum() < TERMS[kind]:
-            continue
+            raise TooFewPointsError(
+                f"{block.sum()} of {len(kept)} control points lie side by side: the model {kind} "
+                "cannot be made without them"
+            )
         biases.append(_fit(kept.take(~block), kind, sigma))
         left_out[inside[block]] = kept.take(block).residuals_px(biases[-1])
     rmse = float(np.sqrt(np.mean((left_out[used] ** 2).sum(axis=1))))
@@ -168,7 +171,7 @@ def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_],
     first = "translation" if kind == SHIFT else "affine"
     start = find_consensus(control.expected_px, control.found_px, CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
-    reach = max(float(np.abs(residuals).max()), LEAST_REACH_PX)
+    reach = reach_px(float(np.abs(residuals).max()), control.size)
     used, sigma = np.zeros(len(control), bool), _SIGMA_RANGE_PX[0]
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)
@@ -178,6 +181,15 @@ def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_],
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
     return used, sigma
+
+
+def reach_px(farthest_px: float, size: tuple[int, int]) -> float:
+    """Return how far off blunders are taken to fall, as likely anywhere.
+
+    As far as the farthest, but no farther than the image is long: one point beyond, as of swapped
+    coordinates, would make others within seem to agree.
+    """
+    return float(np.clip(farthest_px, LEAST_REACH_PX, max(LEAST_REACH_PX, *size)))
 
 
 def _excess(control: Control, sigma_px: float) -> float:

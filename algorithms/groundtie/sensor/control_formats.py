@@ -132,6 +132,9 @@ def _envi_crs(comments: str) -> CRS:
     """Return the CRS of a projection info on WGS 84: a UTM zone, or longitude and latitude."""
     found = re.search(r"projection info\s*=\s*\{([^}]*)\}", comments, re.IGNORECASE)
     words = [] if found is None else [word.strip().lower() for word in found[1].split(",")]
+    units = [word for word in words if re.match(r"units\s*=", word)]
+    if any(not re.search(r"=\s*(meters|degrees)$", word) for word in units):
+        raise ValueError(f"its {units[0]} must be Meters or Degrees")
     if "wgs-84" in words and words[0] == "utm" and words[1].isdigit():
         base = 32700 if "south" in words else 32600
         return CRS.from_epsg(base + int(words[1]))

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..errors import TransformFileError
+from ..errors import GeoreferencingError, TransformFileError
 from ..geometry.georeferencer import SUFFIX as GEOREFERENCER
 from ..geometry.georeferencer import write_georeferencer
 from ..geometry.point_tables import SIGMA
@@ -71,13 +72,31 @@ class ControlPoints(TiePoints):
         return reproject(self.reference_xy, self.crs, LON_LAT)
 
     def seen_by(self, rpc: RPC, size: tuple[int, int]) -> Control:
-        """Return the points as RPCs see them."""
+        """Return the points as RPCs see them.
+
+        Raises
+        ------
+        GeoreferencingError
+            They cannot see one that is used.
+        """
+        expected_px = rpc.project(self.lon_lat, self.height_m)
+        self.require_placed(np.isfinite(expected_px).all(axis=1) | ~self.used)
         return Control(
-            rpc.project(self.lon_lat, self.height_m),
+            expected_px,
             self.input_px,
             self.covariance_px2,
             size,
         )
+
+    def require_placed(self, placed: NDArray[np.bool_]) -> None:
+        """Raise `GeoreferencingError` if RPCs cannot place some of the points."""
+        if not placed.all():
+            raise GeoreferencingError(
+                f"the RPCs cannot place {np.sum(~placed)} of {len(self)} points, the first at "
+                f"{self.reference_xy[~placed][0].tolist()} on the map and "
+                f"{self.input_px[~placed][0].tolist()} in the image: check these positions and "
+                "the points' CRS"
+            )
 
     def write(self, path: str | os.PathLike[str], orientation: Orientation, grid: Grid) -> None:
         """Write the points in the format that the suffix of `path` names (see `SUFFIXES`).

@@ -98,7 +98,7 @@ def check_heights(
         See `HeightCheck`.
     """
     rpc = orientation.rpc
-    seen = seen_at(rpc, size, orientation.heights.typical_m, 33)
+    seen = seen_at(rpc, size, orientation.heights.typical_m)
     heights = orientation.heights.at(seen)
     heights = heights[np.isfinite(heights)]
     low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))

@@ -231,7 +231,7 @@ def _on_map(lon_lat: FloatArray, rpc: RPC, crs: CRS) -> FloatArray:
     return near_longitude(reproject(lon_lat, LON_LAT, crs), x, crs)
 
 
-def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODES) -> FloatArray:
+def seen_at(rpc: RPC, size: tuple[int, int], height_m: float) -> FloatArray:
     """Return longitudes and latitudes all over an image, (n, 2), at a height; none is NaN.
 
     Raises
@@ -239,7 +239,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float, nodes: int = _NODE
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    seen = finite(rpc.localise(*image_lattice(size, [height_m], nodes)))
+    seen = finite(rpc.localise(*image_lattice(size, [height_m], _NODES)))
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")
     return seen

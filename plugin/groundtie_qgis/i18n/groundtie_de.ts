@@ -8,8 +8,8 @@
       <translation>&lt;p&gt;GroundTie braucht Python-Pakete, die dieses QGIS nicht hat: &lt;b&gt;{names}&lt;/b&gt;.&lt;/p&gt;&lt;p&gt;&lt;i&gt;Installieren&lt;/i&gt; lädt sie mit dem Befehl unten aus dem Python Package Index in einen eigenen Ordner von GroundTie: {folder}. QGIS' eigene Pakete bleiben, wie sie sind, und haben Vorrang. Wer den Ordner löscht, macht alles rückgängig.&lt;/p&gt;&lt;p&gt;Oder den Befehl selbst ausführen, oder unter Debian und Ubuntu: &lt;code&gt;{command}&lt;/code&gt;</translation>
     </message>
     <message>
-      <source>A SAR image, as amplitude, intensity or complex.</source>
-      <translation>Ein SAR-Bild, als Amplitude, Intensität oder komplex.</translation>
+      <source>A SAR image, as amplitude or complex.</source>
+      <translation>Ein SAR-Bild, als Amplitude oder komplex.</translation>
     </message>
     <message>
       <source>A coarse shift is searched for on reduced images; SIFT keypoints are matched near where it puts them, and refined by mutual information in chips around them; a robust model is fitted. Parts of the reference are held out of all of this; points in them decide whether the registration is accepted. A refused registration writes no image.</source>

@@ -95,9 +95,7 @@ MatchingPixelSize = Annotated[
         advanced=True,
     ),
 ]
-Radar = Annotated[
-    Path, RasterIn(label="Radar image", help="A SAR image, as amplitude, intensity or complex.")
-]
+Radar = Annotated[Path, RasterIn(label="Radar image", help="A SAR image, as amplitude or complex.")]
 _RADAR_BAND_HELP = "The band that is looked at; by default the mean of all bands."
 RadarBand = Annotated[
     int | None, replace(MATCHED_BAND, label="Band", help=_RADAR_BAND_HELP, of="input")
