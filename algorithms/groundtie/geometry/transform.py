@@ -127,10 +127,10 @@ class Transform:
         None: it has no place, or the input takes up so much of the Earth that there is no other
         side that its positions could be taken for.
         """
-        turn, frame = full_turn(self.crs), self.model.frame
-        if turn is None or frame.to_map == Affine.identity():
+        turn = full_turn(self.crs)
+        if turn is None or self.model.frame.to_map == Affine.identity():
             return None
-        longitude = float(frame.leave(np.zeros((1, 2)))[0, 0])
+        longitude = float(self.model.frame.leave(np.zeros((1, 2)))[0, 0])
         outline = finite(self.nominal_xy(self.input_grid.outline()))
         around = near_longitude(outline, longitude, self.crs)[:, 0]
         is_on_one_side = len(around) > 0 and np.ptp(around) < turn / 2
