@@ -139,7 +139,7 @@ def test_radar_images_of_one_ground_lie_near_whole_pixels_by_chance(
 
 @pytest.mark.parametrize(
     ("reduced", "coarse", "is_of_cameras"),
-    [(0.24, 0.33, True), (0.14, 0.12, False), (0.2, 0.22, False), (0.4, 0.3, False)],
+    [(0.24, 0.33, True), (0.14, 0.12, False), (0.25, 0.29, False), (0.4, 0.35, False)],
 )
 def test_cameras_images_are_alike_in_coarse_pixels(
     reduced: float, coarse: float, is_of_cameras: bool

@@ -29,10 +29,10 @@ LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 # What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
 # the first of the other's are so many times as many as from there to the second. Edges of one
 # ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
-# to 2.1, of different bands on one grid up to 2.45 (years apart) and, of one exposure, 4.2 in 28 of
-# 36 pairs (so that the second is the limit of one camera's views; the others from 6.8 on). Where
-# right transforms have it (suite attacks, controls): up to 2.8; where ground is displaced beneath
-# snow of one shape, from 2.93 on.
+# to 2.5 (one of 340 pairs, a simulated town, 4.6), of different bands on one grid up to 2.45 (years
+# apart) and, of one exposure, 4.2 in 28 of 36 pairs (so that the second is the limit of one
+# camera's views; the others from 6.8 on). Where right transforms have it (suite attacks, controls):
+# up to 2.8; where ground is displaced beneath snow of one shape, from 2.93 on.
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 
@@ -48,7 +48,7 @@ _NEAR_PX = np.array([0.0, _SHARP_PX, _BLURRED_PX, *_BESIDE_PX])
 # More of the area than this varies alike where holes or waters of one shape are cut into noise, or
 # clouds of one deck lie over both. Different sensors' views of one ground, and those of day and
 # night: up to 25 %, measured on the shared pairs where right transforms have them (suite real).
-_LEAST_AREA = 0.3
+LEAST_AREA = 0.3
 
 # Less than this is what most right pairs of a radar's and a camera's image have the same (15 of 17
 # in suite sharpness): without it they show hardly less, and need not be matched once more.
@@ -68,7 +68,7 @@ _LEAST_PART = 0.05
 # along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py). Smoother ones
 # are as ground is, and pass (suite attacks, soft pattern noise).
 _REDUCTION, _FURTHER = 4, 2
-GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
+_GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
 # Where a transform has what is the same lie as nothing drawn does, less shows one ground. Of 12
@@ -121,7 +121,7 @@ class Sameness:
     @property
     def is_evident(self) -> bool:
         """Whether more is the same than two sensors' views show of one ground."""
-        return self.is_marked or self.area >= _LEAST_AREA
+        return self.is_marked or self.area >= LEAST_AREA
 
     @property
     def is_marked(self) -> bool:
@@ -183,16 +183,16 @@ class Sameness:
         pixels, by light and season.
         """
         is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
-        return self.ground >= GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
+        return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def is_of_one_sensor(self) -> bool:
-        """Whether coarse pixels vary alike as those of one sensor's images of one ground.
+        """Whether coarse pixels vary alike over as much as finer ones do of nothing but one ground.
 
-        As many as of what is left. Despeckled radar images of towns and a camera's have up to 13 %,
-        two cameras' 33 % and more where such towns are looked for (suites sharpness and one_grid).
+        Those of a despeckled radar's and a camera's image up to 29 % (suite sharpness), of two
+        cameras' from 33 % on where a radar's town is looked for (suite one_grid).
         """
-        return self.coarse_area >= GROUND_SHARE and not self.is_finer_than_ground
+        return self.coarse_area >= LEAST_AREA and not self.is_finer_than_ground
 
     @property
     def leaves_ground(self) -> bool:
@@ -202,12 +202,12 @@ class Sameness:
     @property
     def varies_as_ground(self) -> bool:
         """Whether as much as of one ground varies alike, or follows in other colours."""
-        return self.has_one_ground or self.related >= GROUND_SHARE
+        return self.has_one_ground or self.related >= _GROUND_SHARE
 
     @property
     def has_one_ground(self) -> bool:
         """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
-        return self.ground >= GROUND_SHARE and not self.is_finer_than_ground
+        return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
 _NO_WINDOWS = np.zeros((4, 3), int)

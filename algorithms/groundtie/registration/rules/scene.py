@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...masks.used import GROUND
-from ...similarity.in_common import GROUND_SHARE
+from ...similarity.in_common import LEAST_AREA
 from ..evidence import RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
@@ -86,7 +86,7 @@ SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "town matched whole",
         f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
-        f"town, less than {GROUND_SHARE:.0%} of coarse pixels vary alike, and not the ground alone "
+        f"town, less than {LEAST_AREA:.0%} of coarse pixels vary alike, and not the ground alone "
         "was matched",
         "suite city",
         f"if it is a town, give the radar image unfiltered; {ON_GROUND}",
