@@ -61,7 +61,7 @@ def test_yaml_without_its_package_is_one_line(
     [
         ("t.csv", "", "has no rows"),
         ("t.csv", "input,output\n", "has no rows"),
-        ("t.csv", "input\na.tif,b.tif\n", "row 1 has more cells"),
+        ("t.csv", "input\na.tif,b.tif\n", "row 1 has more fields"),
         ("t.csv", "input,input\na,b\n", "stands twice"),
         ("t.csv", "max-error,max_error\n1,2\n", "stands twice"),
         ("t.json", "[", "cannot read the table"),

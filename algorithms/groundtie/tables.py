@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -48,19 +49,41 @@ def plain_number(value: Any) -> float:
     return float(value)
 
 
-def _read_csv(path: Path) -> list[dict[str, Any]]:
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        header = file.readline()
-        file.seek(0)
-        # Spreadsheets write semicolons where a comma is the decimal sign.
-        reader = csv.DictReader(file, delimiter=max(_DELIMITERS, key=header.count))
-        names = list(reader.fieldnames or ())
-        rows = list(reader)
-    if len({_column(name) for name in names}) < len(names):
+def csv_rows(
+    lines: Iterable[str], column: Callable[[str], str] = str
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Return the names of a CSV table's columns, and its rows by these.
+
+    Parameters
+    ----------
+    lines
+        The table; its first line has the names.
+    column
+        Returns what a name stands for.
+
+    Raises
+    ------
+    ValueError
+        A name stands twice, or a row has more fields than the first line, other than empty ones.
+    """
+    held = list(lines)
+    # Spreadsheets write semicolons where a comma is the decimal sign.
+    delimiter = max(_DELIMITERS, key=held[0].count) if held else ","
+    reader = csv.DictReader(held, delimiter=delimiter)
+    rows, names = list(reader), [column(name) for name in reader.fieldnames or () if name]
+    if len(set(names)) < len(names):
         raise ValueError("a column's name stands twice in the first line")
     for number, row in enumerate(rows, 1):
-        if None in row:
-            raise ValueError(f"row {number} has more cells than the first line")
+        if any(field.strip() for field in row.pop(None, ())):
+            raise ValueError(
+                f"row {number} has more fields than the first line (is a comma the decimal sign?)"
+            )
+    return names, rows
+
+
+def _read_csv(path: Path) -> list[dict[str, Any]]:
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        _, rows = csv_rows(file, _column)
     return [_filled(row) for row in rows]
 
 

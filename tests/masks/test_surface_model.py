@@ -16,7 +16,12 @@ from rasterio.crs import CRS
 
 from groundtie.errors import NoOverlapError, VectorLayerError
 from groundtie.geometry.views import View
-from groundtie.masks.object_heights import FootprintModel, RasterModel, read_footprints
+from groundtie.masks.object_heights import (
+    FootprintModel,
+    RasterModel,
+    bare_ground,
+    read_footprints,
+)
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import Reason, SurfaceGround
 from groundtie.rasters.grid import Grid, compose
@@ -274,3 +279,13 @@ class TestFootprints:
             read_footprints(footprints(tmp_path / "a.gpkg", ["3"], "levels"), GRID)
         with pytest.raises(VectorLayerError, match="no polygons with a height"):
             read_footprints(footprints(tmp_path / "b.gpkg", ["unknown"]), GRID)
+
+
+def test_ground_beside_what_is_not_known_is_as_high_as_elsewhere() -> None:
+    """Noise makes the lowest heights too low, beside a gap as far from it."""
+    surface = np.random.default_rng(0).normal(100, 0.5, (400, 400)).astype(np.float32)
+    known = np.ones(surface.shape, bool)
+    known[:, :200] = False
+    ground = bare_ground(surface, known, 1.0)
+    beside, far = ground[:, 205:215].mean(), ground[:, 330:370].mean()
+    assert beside == pytest.approx(far, abs=0.2) and far == pytest.approx(100, abs=0.4)

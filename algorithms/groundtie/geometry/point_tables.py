@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..rasters.grid import FloatArray
-from ..tables import plain_number
+from ..tables import csv_rows, plain_number
 
 Row = dict[str, Any]
 
@@ -35,21 +34,12 @@ def table_rows(lines: Iterable[str], needed: Sequence[str]) -> list[Row]:
     KeyError
         One of the needed columns is missing in the first line, whether or not rows follow.
     ValueError
-        A row has more fields than the first line, other than empty ones, or that has a name twice.
+        See `csv_rows`.
     """
-    reader = csv.DictReader(lines)
-    rows = [dict(row) for row in reader]
-    names = [name for name in reader.fieldnames or () if name]
-    if len(set(names)) < len(names):
-        raise ValueError("a column's name stands twice in the first line")
+    names, rows = csv_rows(lines)
     for name in needed:
-        if name not in (reader.fieldnames or needed):
+        if names and name not in names:
             raise KeyError(name)
-    for number, row in enumerate(rows, 1):
-        if any(field.strip() for field in row.pop(None, ())):
-            raise ValueError(
-                f"row {number} has more fields than the first line (is a comma the decimal sign?)"
-            )
     return rows
 
 

@@ -164,7 +164,7 @@ def _mean_above(blocks: FloatImage, lowest: FloatImage, side: int) -> FloatImage
     Blocks are cells of heights, shape (rows, n, cols, n); the mean is that of `side` cells a side.
     """
     steps = np.rint((blocks - lowest[:, None, :, None]) / _STEP_M)
-    is_ground = steps <= LOWEST_M / _STEP_M
+    is_ground = (steps <= LOWEST_M / _STEP_M) & (blocks < _NOWHERE_M)
     total, count = (
         window_sums(values.sum(axis=(1, 3), dtype=np.float64), side)
         for values in (np.where(is_ground, steps, 0), is_ground)
