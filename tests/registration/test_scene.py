@@ -149,19 +149,6 @@ def test_two_rough_images_are_tested_for_layover_whatever_their_units() -> None:
     assert replace(both, declared=NEITHER).are_both_rough
 
 
-def test_decibels_are_what_their_amplitudes_are(tmp_path: Path) -> None:
-    """A town beside a camera's image: its speckle and strong scatterers are found in both."""
-    town, camera = speckled(0.25), grey_values(0.02, 0.01, seed=5)
-    decibels = 20 * np.log10(town / town.max() + 1e-6)
-    found = []
-    for values in (town, decibels):
-        with opened(tmp_path, values, camera) as pair:
-            info = SceneInfo.of(pair)
-            assert info.is_town and info.radar_name == REFERENCE
-            found.append((info.reference.variation2, info.reference.strong_share))
-    assert found[0] == pytest.approx(found[1], rel=0.02)
-
-
 def test_metadata_count_before_speckle(tmp_path: Path) -> None:
     """The filtered image is the more homogeneous one."""
     random = np.random.default_rng(0)

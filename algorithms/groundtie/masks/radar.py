@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..rasters.pair import Image
-from ..rasters.patch import Patch, is_logarithmic, middle_window
+from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
 from ..speckle.statistics import homogeneous_variation2
 
@@ -21,7 +21,7 @@ LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 def variation2_of(image: Image) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
 
-    Grey values are taken for amplitudes, or for decibels.
+    Grey values are taken for amplitudes.
     """
     middle = middle_window(image.source.grid, SAMPLE_PX)
     patch = Patch(*image.source.read(middle, image.band))
@@ -29,10 +29,5 @@ def variation2_of(image: Image) -> float:
 
 
 def power(patch: Patch) -> FloatImage:
-    """Return the power of amplitudes, or of decibels, 0 where invalid."""
-    values = patch.values
-    if is_logarithmic(values[patch.valid]):
-        found = np.float32(10) ** (values / np.float32(10))
-    else:
-        found = values * values
-    return np.where(patch.valid, found, np.float32(0))
+    """Return the power of amplitudes, 0 where invalid."""
+    return np.where(patch.valid, patch.values * patch.values, np.float32(0))

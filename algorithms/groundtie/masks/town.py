@@ -23,10 +23,11 @@ _MEANS = 1_000_000
 def share_of_strong_scatterers(scene: Scene) -> float:
     """Return the share of an image, 0 to 1, that is brighter than usual by 6 dB or more.
 
-    Grey values are amplitudes, or decibels; means over 4 × 4 pixels are compared with their median.
+    Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. Decibels
+    are none: such an image has no share.
     """
-    means = scene.sample(threshold.BLOCK_PX, _MEANS)
-    if means.size == 0:
+    amplitude = scene.sample(threshold.BLOCK_PX, _MEANS)
+    if amplitude.size == 0 or is_logarithmic(amplitude):
         return 0.0
-    power = 10 ** (means / 10) if is_logarithmic(means) else means**2
+    power = amplitude**2
     return float(np.mean(power > _STRONG * np.median(power)))
