@@ -22,9 +22,8 @@ from groundtie.rasters.reading import open_raster
 TILE_PX = 1000
 BUDGET_MB, CACHE_BYTES = 100, 20_000_000
 
-# What the allocator keeps differs from run to run: up to 64 MB at the end of a heap
-# (groundtie.memory).
-SCATTER_BYTES = 64_000_000
+# What the allocator keeps differs from run to run.
+SCATTER_BYTES = 48_000_000
 
 # As much as the machine has would be taken, unless a tool asks for less.
 CALL = f"""
