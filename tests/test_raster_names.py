@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from groundtie.raster_names import file_name, identity, is_remote, located, raster_name
+from groundtie.raster_names import (
+    facts_behind,
+    file_name,
+    identity,
+    is_remote,
+    local_files,
+    located,
+    raster_name,
+)
 
 URL = "/vsicurl/https://host/a/b.tif"
 
@@ -91,3 +99,48 @@ def test_names_beside_a_file(name: str, beside: str | Path, expected: str | Path
 def test_the_name_of_a_file_is_its_last_part() -> None:
     assert file_name(f"{URL}?signature=a/b") == "b.tif"
     assert file_name(Path("/a/b.tif")) == "b.tif"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "{0}",
+        "/vsizip/{0}/inner/b.tif",
+        "/vsitar/{0}/b.tif",
+        "/vsigzip/{0}",
+        "/vsizip//vsitar/{0}/c.zip/b.tif",
+        "/vsizip/{{{0}}}/b.tif",
+        'NETCDF:"{0}":band',
+        "NETCDF:{0}:band",
+        'HDF5:"{0}"://group/band',
+        "GTIFF_DIR:1:{0}",
+        "/vsisubfile/0_10,{0}",
+    ],
+)
+def test_the_file_behind_one_of_gdals_names_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    file = tmp_path / "a.nc"
+    file.touch()
+    known = facts_behind(name.format(file))
+    assert local_files(name.format(file)) == [file]
+    assert known == facts_behind(name.format(file))
+    file.write_bytes(b"other")
+    assert known != facts_behind(name.format(file))
+    assert local_files(name.format("a.nc"), tmp_path) == [file]
+    monkeypatch.chdir(tmp_path)
+    assert local_files(name.format("a.nc")) == [file]
+
+
+def test_an_archive_may_have_the_signs_of_other_names(tmp_path: Path) -> None:
+    archive = tmp_path / "a:b, {c}.zip"
+    archive.touch()
+    assert local_files(f"/vsizip/{archive}/b.tif") == [archive]
+
+
+@pytest.mark.parametrize(
+    "name", ["/vsizip/none.zip/b.tif", 'NETCDF:"none.nc":b', "/vsimem/b.tif", URL, Path("none.tif")]
+)
+def test_of_what_is_no_file_nothing_is_known(name: Path | str) -> None:
+    assert isinstance(name, Path) or local_files(name) == []
+    assert facts_behind(name) != facts_behind(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,22 @@ def test_raw_bands_and_other_endings_count(tmp_path: Path) -> None:
     with rasterio.open(virtual) as dataset:
         np.testing.assert_array_equal(dataset.read(1), VALUES)
     assert sources_of(virtual) == [tmp_path / "raw.bin"]
+
+
+@pytest.mark.parametrize("is_relative", [False, True])
+def test_a_source_in_an_archive_is_the_archive(image: Path, is_relative: bool) -> None:
+    archive = image.with_name("a.zip")
+    with zipfile.ZipFile(archive, "w") as file:
+        file.write(image, "a.tif")
+    virtual = image.with_name("v.vrt")
+    rasterio.shutil.copy(f"/vsizip/{archive}/a.tif", virtual, driver="VRT")
+    text = virtual.read_text()
+    assert "/vsizip/" in text
+    if is_relative:
+        text = text.replace(f"/vsizip/{archive}", "/vsizip/a.zip")
+        text = text.replace('relativeToVRT="0"', 'relativeToVRT="1"')
+        virtual.write_text(text)
+    assert sources_of(virtual) == [archive]
 
 
 def test_names_are_relative_to_where_a_link_leads(tmp_path: Path, image: Path) -> None:

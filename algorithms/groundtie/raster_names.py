@@ -14,9 +14,16 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from .errors import ParameterError
+from .runs import file_facts, unknown_facts
 
 # GDAL's own names, such as /vsizip/a.zip/b.tif or HDF5:"a.h5"://b; C:\\… is a path.
 _GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
+
+# GDAL's names of what lies in an archive, which may lie in another: the path follows.
+_IN_ARCHIVE = re.compile(r"((?:/vsi(?:zip|tar|gzip|7z|rar)/)+)(.*)", re.S)
+
+# What stands between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one.
+_PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
 # pathlib makes one slash of two.
 _URL = re.compile(r"(/vsicurl/)?(https?|ftp|s3|gs|az|abfss?|oss|file):/{1,2}(?=[^/]|/[^/])", re.I)
@@ -71,7 +78,7 @@ def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Pa
         kind, rest = url[2].lower(), text[url.end() :]
         return f"{_FILE_SYSTEMS[kind]}{rest}" if kind != "file" else Path(f"/{rest.lstrip('/')}")
     # A path is what it states; only GDAL's virtual file systems look like one.
-    is_text = isinstance(value, str) and _GDAL_NAME.match(text)
+    is_text = isinstance(value, str) and is_gdal_name(text)
     return text if is_text or text.startswith("/vsi") else Path(text)
 
 
@@ -126,9 +133,63 @@ def located(name: str, beside: Path | str) -> Path | str:
     return f"{system}{mark}{posixpath.normpath(f'{start}/{name}')}"
 
 
+def is_gdal_name(text: str) -> bool:
+    """Return whether a text is one of GDAL's own names, unless there is a file of that name."""
+    return _GDAL_NAME.match(text) is not None
+
+
 def is_remote(name: Path | str) -> bool:
     """Return whether a raster is read over a network."""
     return isinstance(name, str) and _REMOTE.search(name) is not None
+
+
+def in_archive(name: str) -> tuple[str, str]:
+    """Return GDAL's names of the archives that a raster lies in, and the path that follows.
+
+    The first is empty for a raster that lies in none.
+    """
+    found = _IN_ARCHIVE.fullmatch(name)
+    return (found[1], found[2]) if found else ("", name)
+
+
+def parts_of(name: str) -> list[str]:
+    """Return the parts of one of GDAL's names, such as `NETCDF:"a.nc":band`; one is the file."""
+    return _PARTS.split(name)
+
+
+def local_files(name: str, folder: Path | str = "") -> list[Path]:
+    """Return the files on disk that a raster's name refers to: itself, archives, containers.
+
+    Of what is read over a network, of folders and of what is not there these are none.
+
+    Parameters
+    ----------
+    name
+        The name, as GDAL takes it.
+    folder
+        Where relative names begin; by default the working directory.
+    """
+    if is_remote(name):
+        return []
+    # Also the whole: what is no path to GDAL's drivers may well be one.
+    paths = (in_archive(part)[1] for part in (name, *parts_of(name)))
+    places = (Path(os.path.abspath(os.path.join(folder, path))) for path in paths if path)
+    found = (file_on_the_way_to(place) for place in places)
+    return list(dict.fromkeys(file for file in found if file is not None))
+
+
+def file_on_the_way_to(path: Path) -> Path | None:
+    """Return the path or the first of those above it that is a file, as an archive is."""
+    return next((one for one in (path, *path.parents) if os.path.isfile(one)), None)
+
+
+def facts_behind(name: Path | str) -> list[tuple[Any, ...]]:
+    """Return place, size and time of the files that a raster's name refers to.
+
+    Where there are none, nothing is known as unchanged: these facts are never the same again.
+    """
+    files = local_files(name) if isinstance(name, str) else [name]
+    return [file_facts(file) for file in files if os.path.isfile(file)] or [unknown_facts(name)]
 
 
 def file_name(name: Any) -> str:

@@ -123,6 +123,11 @@ def file_facts(path: Path | str) -> tuple[Any, ...]:
     return (str(path),) if state is None else (os.path.abspath(path), *state)
 
 
+def unknown_facts(name: Path | str) -> tuple[str, str]:
+    """Return facts of what may have changed without a trace: no others are the same."""
+    return str(name), secrets.token_hex(8)
+
+
 def _facts(value: Any) -> Any:
     if isinstance(value, Path):
         state = file_state(value)

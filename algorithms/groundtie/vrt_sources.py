@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
+from .raster_names import is_gdal_name, local_files
+
 # What a virtual raster begins with, whatever its file is called.
 _START = b"<VRTDataset"
 _SEARCHED_BYTES = 1024
@@ -38,7 +40,7 @@ def _named_in(path: Path) -> list[Path]:
             return []
         root = ElementTree.parse(path).getroot()
         sources = [one for one in root.iter() if one.tag.lower() in _SOURCES and one.text]
-        return [_place(one, path.parent).resolve() for one in sources]
+        return [place.resolve() for one in sources for place in _places(one, path.parent)]
     except (OSError, RuntimeError, ElementTree.ParseError, ValueError, LookupError):
         return []  # damaged, of an encoding that nobody knows, or a loop of links
 
@@ -50,7 +52,12 @@ def _is_virtual(path: Path) -> bool:
         return _START in file.read(_SEARCHED_BYTES)
 
 
-def _place(source: ElementTree.Element, folder: Path) -> Path:
+def _places(source: ElementTree.Element, folder: Path) -> list[Path]:
+    """Return where a source lies: its file, or those that one of GDAL's names refers to."""
     name = str(source.text)
     is_relative = {key.lower(): word for key, word in source.items()}.get("relativetovrt") == "1"
-    return folder / name if is_relative else Path(name)
+    place = folder / name if is_relative else Path(name)
+    if place.exists() or not is_gdal_name(name):
+        return [place]
+    # What stays unknown has the name, where no file is.
+    return local_files(name, folder if is_relative else "") or [place]

@@ -221,6 +221,30 @@ def test_the_key_stands_for_what_gdal_reads_beside_an_input(
     assert after.key != before.key
 
 
+@pytest.mark.parametrize("others", ["", "/vsizip/{0}/b.tif", "dates.csv"])
+def test_the_key_stands_for_the_archive_that_an_input_lies_in(
+    folders: tuple[Path, Path], others: str
+) -> None:
+    archive = folders[0] / "b.zip"
+    archive.write_bytes(b"archive")
+    (folders[0] / "dates.csv").write_text(f"file\n/vsizip/{archive}/b.tif\n")
+    row = {**ROW, "others": others.format(archive)} if others else None
+    row = row or {**ROW, "input": f"/vsizip/{archive}/b.tif"}
+    (before,) = calls_of(folders, row)
+    assert not before.problem and calls_of(folders, row)[0].key == before.key
+    archive.write_bytes(b"another")
+    os.utime(archive, (1e9, 1e9))
+    assert calls_of(folders, row)[0].key != before.key
+
+
+def test_an_input_of_which_no_file_is_known_has_never_the_same_key(
+    folders: tuple[Path, Path],
+) -> None:
+    row = {**ROW, "input": "/vsicurl/https://host/b.tif"}
+    first, second = calls_of(folders, row, row)
+    assert not first.problem and first.key != second.key
+
+
 @pytest.mark.parametrize("is_nested", [False, True])
 def test_the_key_stands_for_what_a_virtual_input_is_made_of(
     folders: tuple[Path, Path], is_nested: bool

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zipfile
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.shutil
+from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
+from rasterio.io import MemoryFile
 from series_dates import FRAME
 from shapely.geometry import box, mapping
 from textured_pairs import texture
@@ -29,6 +32,7 @@ from groundtie.series.settling import DateVerdict, Settled, settle
 SIZE = 40
 GRID = utm_grid(SIZE, SIZE)
 SETTINGS = Settings("auto", 3.0, None, None)
+PROFILE = {"driver": "GTiff", "count": 1, "height": SIZE, "width": SIZE, "dtype": "float32"}
 
 
 def keys(folder: Path, context: Context, ending: str = ".tif") -> tuple[str, str, str]:
@@ -130,6 +134,69 @@ def test_a_virtual_raster_of_another_source_is_another_date(
     write_raster(tmp_path / "source.tif", texture(SIZE, SIZE)[::-1].astype(np.float32), GRID)
     after = keys(tmp_path, one_thread, ".vrt")
     assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def archive(path: Path, values: NDArray[np.float32]) -> str:
+    """Write an archive of one raster, and return GDAL's name of that."""
+    raster = write_raster(path.with_suffix(".tif"), values, GRID)
+    with zipfile.ZipFile(path, "w") as file:
+        file.write(raster, raster.name)
+    raster.unlink()
+    return f"/vsizip/{path}/{raster.name}"
+
+
+@pytest.mark.parametrize("is_virtual", [False, True])
+def test_another_archive_of_the_same_name_is_another_date(
+    tmp_path: Path, one_thread: Context, is_virtual: bool
+) -> None:
+    ground = texture(SIZE, SIZE).astype(np.float32)
+    name = archive(tmp_path / "a.zip", ground)
+    virtual = tmp_path / "a.vrt"
+    rasterio.shutil.copy(name, virtual, driver="VRT")
+
+    def key() -> str:
+        with ExitStack() as stack:
+            listed = Listed("a", virtual if is_virtual else name, None)
+            (date,), failures = open_dates([listed], None, stack, one_thread)
+            assert not failures
+            return date.key
+
+    before = key()
+    assert key() == before
+    archive(tmp_path / "a.zip", ground[::-1])
+    assert key() != before
+
+
+def test_another_archive_of_a_mask_makes_another_date(tmp_path: Path, one_thread: Context) -> None:
+    path = write_raster(tmp_path / "a.tif", texture(SIZE, SIZE).astype(np.float32), GRID)
+    mask = np.ones((SIZE, SIZE), np.float32)
+    name = archive(tmp_path / "mask.zip", mask)
+
+    def key() -> str:
+        with ExitStack() as stack:
+            listed = Listed("a", path, None, UserMask(name))
+            (date,), failures = open_dates([listed], None, stack, one_thread)
+            assert not failures
+            return date.key
+
+    before = key()
+    assert key() == before
+    mask[:5] = 0
+    archive(tmp_path / "mask.zip", mask)
+    assert key() != before
+
+
+def test_a_date_of_which_no_file_is_known_is_never_known_as_unchanged(one_thread: Context) -> None:
+    with MemoryFile() as file:
+        with file.open(**PROFILE) as dataset:
+            dataset.write(texture(SIZE, SIZE)[None].astype(np.float32))
+        found = []
+        for _ in range(2):
+            with ExitStack() as stack:
+                listed = Listed("a", file.name, None)
+                (date,), _ = open_dates([listed], None, stack, one_thread)
+                found.append((date.key, date.key))
+    assert found[0][0] == found[0][1] != found[1][0]
 
 
 @pytest.mark.parametrize("most_bytes", [0, 10**9])

@@ -12,9 +12,10 @@ from ..call_paths import inputs_of
 from ..declaration import Tool
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
+from ..raster_names import facts_behind, local_files
 from ..rasters.atomic import SIDECARS
 from ..runs import file_facts
-from ..series.inputs import files_behind
+from ..series.inputs import rasters_behind
 from ..vrt_sources import sources_of
 
 # What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
@@ -36,15 +37,23 @@ def names_in(folder: Path) -> frozenset[str]:
 
 def files_read(kind: Kind, value: Any) -> Iterator[Path]:
     """Yield the files, or folders of one raster, that a parameter's checked value stands for."""
+    for name in _names_read(kind, value):
+        yield from (name,) if isinstance(name, Path) else local_files(name)
+
+
+def _names_read(kind: Kind, value: Any) -> Iterator[Path | str]:
+    """Yield the files and GDAL's names that a parameter's checked value stands for."""
     for given in inputs_of(kind, value):
-        if isinstance(given, Path):
-            yield from files_behind(given) if isinstance(kind, RastersIn) else (given,)
+        is_several = isinstance(given, Path) and isinstance(kind, RastersIn)
+        yield from rasters_behind(given) if is_several else (given,)
 
 
 def facts_read(
     tool: Tool, values: Mapping[str, Any], written: Collection[Path], listed: Listed
 ) -> list[tuple[Any, ...]]:
     """Return place, size and time of all files that a call reads, as a key can hold them.
+
+    What lies where no file's time is known, as on a server, is never the same.
 
     Parameters
     ----------
@@ -58,10 +67,14 @@ def facts_read(
     own = {os.path.abspath(path) for path in written}
     facts: list[tuple[Any, ...]] = []
     for parameter in tool.parameters:
-        for path in files_read(parameter.kind, values[parameter.name]):
+        kind, value = parameter.kind, values[parameter.name]
+        names = [name for name in _names_read(kind, value) if isinstance(name, str)]
+        found = list(chain.from_iterable(map(facts_behind, names)))
+        for path in files_read(kind, value):
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
-            found = map(_facts, chain([path], inside, _beside(path, listed), sources_of(path)))
-            facts += [(parameter.name, *one) for one in found if one[0] not in own]
+            found += map(_facts, chain([path], inside, _beside(path, listed)))
+            found += chain.from_iterable(map(facts_behind, sources_of(path)))
+        facts += [(parameter.name, *one) for one in found if one[0] not in own]
     return facts
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,6 +12,7 @@ import rasterio.shutil
 from rasterio.enums import MaskFlags
 
 from ..errors import ParameterError
+from ..raster_names import file_on_the_way_to, in_archive, parts_of
 from ..runs import RUN_TAG, run_tags
 from .atomic import scratch_file, writing
 from .grid import Grid
@@ -21,12 +21,6 @@ from .reading import RasterSource
 from .remote import environment
 
 SUFFIX = ".vrt"
-
-# GDAL's name of what lies in an archive, whose path has no slash at its start.
-_IN_ARCHIVE = re.compile(r"(/vsi(?:zip|tar|gzip|7z|rar)/)([^/{].*)")
-
-# What stands between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one.
-_PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
 # What else would locate the pixels, or is of the file that they are in.
 _OWN = ("GCPList", "GeoTransform")
@@ -146,10 +140,10 @@ def _absolute(name: str) -> str:
     """Return a raster's name that means the same in any working folder: GDAL makes none so."""
     if os.path.exists(name):
         return os.path.abspath(name)
-    archive = _IN_ARCHIVE.fullmatch(name)
-    if archive and any(os.path.isfile(path) for path in (archive[2], *Path(archive[2]).parents)):
-        return archive[1] + os.path.abspath(archive[2])
-    if any(os.path.exists(part) and not os.path.isabs(part) for part in _PARTS.split(name)):
+    archives, path = in_archive(name)
+    if archives and not os.path.isabs(path) and file_on_the_way_to(Path(path)):
+        return archives + os.path.abspath(path)
+    if any(os.path.exists(part) and not os.path.isabs(part) for part in parts_of(name)):
         raise ParameterError(
             f"a {SUFFIX} cannot refer to {name}, which is relative to the working folder: "
             "give the whole path"

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from ..context import Context
 from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
 from ..memory import DATES_SHARE, share_bytes
+from ..raster_names import facts_behind
 from ..rasters.grid import FloatArray, Grid, reproject
 from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
@@ -27,7 +28,7 @@ from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
 from ..registration.user_masks import UserMask
 from ..report.pictures import overview_grid
-from ..runs import digest, file_facts
+from ..runs import digest, file_facts, unknown_facts
 from ..vrt_sources import sources_of
 from .date_masks import draw_mask
 from .inputs import Listed
@@ -112,7 +113,8 @@ class Date:
         if mask.is_raster:
             with open_raster(mask.mask) as source:
                 return raster_facts(mask.mask, source), mask.values
-        return *map(file_facts, parts_of_layer(mask.mask)), mask.values
+        parts = chain.from_iterable(map(_facts_of, parts_of_layer(mask.mask)))
+        return *parts, mask.values
 
     @cached_property
     def key(self) -> str:
@@ -219,18 +221,27 @@ def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
     """Return what a raster's pixels and their place come from: the files behind it, what it states.
 
     Programs that show a raster write statistics into its `.aux.xml`: of that counts what else the
-    raster states by it.
+    raster states by it. What lies where no file's time is known, as on a server, is never the same.
 
     Parameters
     ----------
     raster, source
         As it was named, and open.
     """
-    behind: list[str] = []
+    behind: list[Path | str] = []
+    if isinstance(raster, (str, Path)):
+        behind = [name for name in source.files() if not name.endswith(".aux.xml")]
     if isinstance(raster, Path):
-        behind = [*source.files(), *map(str, sources_of(raster))]
-    files = [raster, *(name for name in behind if not name.endswith(".aux.xml"))]
-    return *map(file_facts, files), source.grid.to_json(), *_stated(source)
+        behind += sources_of(raster)
+    facts = chain(_facts_of(raster), *map(facts_behind, behind))
+    return *facts, source.grid.to_json(), *_stated(source)
+
+
+def _facts_of(named: Any) -> list[tuple[Any, ...]]:
+    """Return the facts of a raster or a layer as it was named; one in memory has none to keep."""
+    if isinstance(named, Path):
+        return [file_facts(named)]
+    return facts_behind(named) if isinstance(named, str) else [unknown_facts(named.name)]
 
 
 def _stated(source: RasterSource) -> tuple[Any, ...]:

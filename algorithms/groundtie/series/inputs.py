@@ -130,19 +130,19 @@ def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
     return [_file(given)]
 
 
-def files_behind(given: Path) -> Iterator[Path]:
-    """Yield the files on disk by which a name becomes dates: itself, and those that it stands for.
+def rasters_behind(given: Path) -> Iterator[Path | str]:
+    """Yield what a name becomes dates by: its file, and the files and names that it stands for.
 
     What cannot be read stands for nothing: `list_dates` says why.
     """
     files = _standing_for(given)
     if files != [given]:
         for file in files:
-            yield from files_behind(file)
+            yield from rasters_behind(file)
         return
     yield given
     with suppress(OSError, ParameterError):
-        yield from (path for path in _named_in(given) if isinstance(path, Path))
+        yield from _named_in(given)
 
 
 def _named_in(given: Path) -> Iterator[Path | str]:
