@@ -341,6 +341,11 @@ def test_names_may_be_as_long_as_the_system_allows(tmp_path: Path) -> None:
     assert sorted(os.listdir(tmp_path)) == sorted(names)
 
 
+def test_a_name_that_is_too_long_is_an_error(tmp_path: Path) -> None:
+    with Outputs() as outputs, pytest.raises(OutputError, match=r"cannot write .*too long"):
+        outputs.stage(tmp_path / ("x" * 256))
+
+
 def test_an_output_that_was_never_written_is_an_error(tmp_path: Path) -> None:
     def work() -> None:
         with Outputs() as outputs:

@@ -26,8 +26,11 @@ SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
 
 _ROLE = re.compile(r"-new(\.[^.]*)?$")
 
-# Of Linux and Windows, in bytes or characters; the rest of a hidden name takes up to 40.
-_LONGEST_NAME = 255 - 40
+# Of Linux and Windows, in bytes or characters.
+LONGEST_NAME = 255
+
+# The rest of a hidden name takes up to 40.
+_LONGEST_IN_HIDDEN = LONGEST_NAME - 40
 
 _FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 
@@ -58,13 +61,15 @@ class Outputs:
         Raises
         ------
         OutputError
-            `path` is a folder, lies in none or in one that cannot be written to, or was staged
-            already.
+            `path` is a folder, lies in none or in one that cannot be written to, has a name that
+            is too long, or was staged already.
         """
         final = Path(os.path.abspath(path))
         if final in self._staged:
             raise OutputError(f"output is named twice: {path}")
-        if final.is_dir():
+        with writing(final):  # no system looks for a name that is too long
+            is_folder = final.is_dir()
+        if is_folder:
             raise OutputError(f"output is a folder, not a file: {path}")
         if not final.parent.is_dir():
             raise OutputError(f"the folder of the output does not exist: {final.parent}")
@@ -102,7 +107,7 @@ class Outputs:
         if folder not in self._claims:
             with writing(final):
                 self._claims[folder] = Claim(folder, self._token)
-        fits = len(os.fsencode(final.name)) <= _LONGEST_NAME
+        fits = len(os.fsencode(final.name)) <= _LONGEST_IN_HIDDEN
         stem = final.stem if fits else f"output-{next(self._names)}"
         return folder / hidden_name(self._token, role, stem, final.suffix)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -17,12 +18,13 @@ from ..executors import open_executor
 from ..geometry.transform import Transform
 from ..progress import Progress
 from ..raster_names import identity
+from ..rasters.atomic import LONGEST_NAME
 from ..registration.evidence import DateEvidence
 from ..registration.registered_output import model_for_grid
 from ..registration.user_masks import UserMask
 from ..vrt_sources import sources_of
 from .dates import Date, footprint_shares, open_dates
-from .delivery import SeriesFiles
+from .delivery import SeriesFiles, registered_name
 from .frame import SeriesFrame
 from .inputs import Listed, list_dates
 from .pairs import Settings
@@ -66,6 +68,7 @@ class SeriesCall:
             They do not go together, or name what is not there.
         """
         listed, reference = _listed(given)
+        _require_names_that_fit(listed, reference)
         files = SeriesFiles(
             given["output_folder"], given["output_grid"], given["resampling"], given["report"]
         )
@@ -194,6 +197,18 @@ def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
 
 def _is_same(date: Listed, other: Listed) -> bool:
     return identity(date.raster) == identity(other.raster)
+
+
+def _require_names_that_fit(listed: tuple[Listed, ...], reference: str | None) -> None:
+    """Raise an error for a date whose registered raster no file system could name."""
+    for date in listed:
+        size = len(os.fsencode(registered_name(date.name)))
+        if date.name != reference and size > LONGEST_NAME:
+            raise ParameterError(
+                f"a date of the series has a name that is too long by {size - LONGEST_NAME} bytes "
+                f"for its registered image: {date.name[:60]}…; give it another in a CSV table with "
+                "the columns file and name"
+            )
 
 
 def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:

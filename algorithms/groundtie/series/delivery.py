@@ -129,7 +129,7 @@ class SeriesFiles:
                 with open_raster(self.folder / before.file) as source:
                     return replace(one, transform=before.transform), before, source.grid
         context.update(0.0, f"writing {one.name}")
-        path = self.folder / f"{one.name}_registered.cog.tif"
+        path = self.folder / registered_name(one.name)
         output = RegisteredOutput(path, self.output_grid, self.resampling)
         grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
         state = state_of(outputs.staged(path))
@@ -176,6 +176,11 @@ class SeriesFiles:
             for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
                 with writing(self.folder / name):
                     (self.folder / name).unlink(missing_ok=True)
+
+
+def registered_name(date: str) -> str:
+    """Return what the registered raster of a date is called."""
+    return f"{date}_registered.cog.tif"
 
 
 def _write_layer(path: Path, series: Series) -> None:
