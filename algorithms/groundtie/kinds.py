@@ -109,14 +109,19 @@ class OutputKind(WrittenKind):
         return path
 
 
+@dataclass(frozen=True, kw_only=True)
 class RasterIn(InputKind):
     """A raster that is read: a path, or text of GDAL's own names (`/vsi…`, `DRIVER:…`).
 
     URLs and assets of STAC items (`item.json#asset`) become these. In Python a raster may be in
-    memory, too (see `arrays.in_memory`).
+    memory, too (see `arrays.in_memory`), unless it `must_have_name`: the tool goes by that.
     """
 
+    must_have_name: bool = False
+
     def check(self, name: str, value: Any) -> Any:
+        if self.must_have_name:
+            _named(name, value)
         return self.check_raster(name, value)
 
 
@@ -130,7 +135,7 @@ class RastersIn(Kind):
     def check(self, name: str, value: Any) -> tuple[Any, ...]:
         given = (value,) if isinstance(value, (str, os.PathLike)) else value
         if not isinstance(given, (list, tuple)):
-            raise ParameterError(f"{name} must be paths, not {value!r}")
+            raise ParameterError(f"{name} must be paths, not {_shown(value)}")
         if not given:
             raise ParameterError(f"{name} is missing")
         kind = InputKind(label=self.label, help=self.help)
@@ -304,9 +309,14 @@ class Band(Kind):
 def _named(name: str, value: Any) -> Path | str:
     """Return a path or GDAL's own name; `ParameterError` for what is neither."""
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
-        raise ParameterError(f"{name} must be a path, not {value!r}")
+        raise ParameterError(f"{name} must be a path, not {_shown(value)}")
     require_possible(name, os.fspath(value))
     return raster_name(value)
+
+
+def _shown(value: Any) -> str:
+    """Return what stands for a wrong value in one line: arrays show theirs in many."""
+    return f"{' '.join(reprlib.repr(value).split()):.60}"
 
 
 def _mode(name: str, path: str | Path) -> int | None:

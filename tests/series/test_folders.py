@@ -17,7 +17,8 @@ from rasterio.crs import CRS
 from rasterio.windows import Window
 from textured_pairs import texture
 
-from groundtie.errors import NotRegisteredError
+from groundtie.arrays import Raster
+from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.rasters.grid import Grid
 from groundtie.series import registering
 from groundtie.series.pairs import PairResult, PairTask, pair_key
@@ -87,6 +88,40 @@ def test_what_is_written_beyond_the_overlap_is_stated(
     stated = [line for line in found.lines() if "outside of the overlap" in line]
     assert [("50%" in line, "(b)" in line) for line in stated] == [(True, True)] * bool(share)
     assert ("outside of the overlap" in files[3].read_text()) == bool(share)
+
+
+def test_a_name_that_is_too_long_is_an_error_before_any_matching(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registering, "register_pair", None)
+    long = "x" * 238
+    dates, out = dates_at(tmp_path / "dates", UTM, 500_000, long, "y"), tmp_path / "out"
+    with pytest.raises(ParameterError, match=r"name that is too long by 2 bytes.*: xxx") as error:
+        coregister_series(out, [dates], reference=dates / "y.tif")
+    assert "\n" not in str(error.value) and not out.exists()
+
+
+def test_the_name_of_the_reference_may_be_long(tmp_path: Path) -> None:
+    """It is not written."""
+    long = "x" * 238
+    dates = dates_at(tmp_path / "dates", UTM, 500_000, long, "x" * 236)
+    coregister_series(tmp_path / "out", [dates], reference=dates / f"{long}.tif")
+    assert (tmp_path / "out" / f"{'x' * 236}_registered.cog.tif").exists()
+
+
+@pytest.mark.parametrize("kind", ["array", "raster", "dataset"])
+@pytest.mark.parametrize("place", ["reference", "inputs"])
+def test_what_has_no_file_is_one_line(tmp_path: Path, kind: str, place: str) -> None:
+    dates = dates_at(tmp_path / "dates", UTM, 500_000, "a", "b")
+    values = np.ones((SIZE, SIZE), np.float32)
+    with rasterio.open(dates / "a.tif") as dataset:
+        of_kind = {"array": values, "raster": Raster(values), "dataset": dataset}
+        given: dict[str, Any] = {"inputs": [dates], place: of_kind[kind]}
+        if place == "inputs" and kind != "raster":
+            given["inputs"] = [given["inputs"]]
+        with pytest.raises(ParameterError, match=rf"{place} must be (a path|paths), not") as error:
+            coregister_series(tmp_path / "out", **given)
+    assert "\n" not in str(error.value)
 
 
 def refuse(task: PairTask, *_: Any) -> PairResult:

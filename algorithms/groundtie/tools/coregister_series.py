@@ -48,6 +48,7 @@ def coregister_series(
         Path | None,
         RasterIn(
             label="Reference image",
+            must_have_name=True,
             help="The image whose georeferencing is right; without one the mean displacement of "
             "all dates is zero.",
         ),
