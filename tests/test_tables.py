@@ -70,6 +70,8 @@ def test_yaml_without_its_package_is_one_line(
         ("t.json", '{"rows": 3}', "a list of rows"),
         ("t.json", '{"row": []}', "rows and defaults only"),
         ("t.json", '[{"seed": NaN}]', "no finite number"),
+        ("t.json", f'[{{"name": {"9" * 400}}}]', "no finite number"),
+        ("t.json", f'[{{"name": {"9" * 9000}}}]', "no finite number"),
         ("t.yaml", "a: [", "cannot read the table"),
         ("t.yaml", "", "a list of rows"),
         ("t.yaml", "- !!python/object/apply:os.getcwd []", "cannot read the table"),
@@ -89,3 +91,10 @@ def test_what_is_no_table_is_one_line(
 def test_a_missing_table_is_named(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"none\.csv: No such file"):
         read_rows(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("digits", ["20240101123045123", "9" * 300, "-12345678901234567"])
+def test_numbers_of_json_that_are_names_keep_their_digits(tmp_path: Path, digits: str) -> None:
+    path = tmp_path / "t.json"
+    path.write_text(f'[{{"name": {digits}}}]')
+    assert [str(row["name"]) for row in read_rows(path)] == [digits]

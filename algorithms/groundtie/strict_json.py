@@ -12,8 +12,15 @@ from pathlib import Path
 from typing import Any
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path, *, keeps_digits: bool = False) -> Any:
     """Return what a JSON file holds; all of its numbers are finite.
+
+    Parameters
+    ----------
+    path
+        The file.
+    keeps_digits
+        As `parse_json`.
 
     Raises
     ------
@@ -22,11 +29,18 @@ def read_json(path: Path) -> Any:
     ValueError
         As `parse_json`.
     """
-    return parse_json(path.read_bytes())
+    return parse_json(path.read_bytes(), keeps_digits=keeps_digits)
 
 
-def parse_json(content: bytes) -> Any:
+def parse_json(content: bytes, *, keeps_digits: bool = False) -> Any:
     """Return what JSON in UTF-8 states; all of its numbers are finite.
+
+    Parameters
+    ----------
+    content
+        The JSON.
+    keeps_digits
+        Whole numbers keep all digits, as those that are names must; else long ones become floats.
 
     Raises
     ------
@@ -37,7 +51,7 @@ def parse_json(content: bytes) -> Any:
         return json.loads(
             content.decode("utf-8-sig"),
             parse_float=_finite,
-            parse_int=_whole,
+            parse_int=_exact if keeps_digits else _whole,
             parse_constant=_finite,
         )
     except RecursionError as error:
@@ -54,3 +68,8 @@ def _finite(text: str) -> float:
 def _whole(text: str) -> int | float:
     # A float has 15 digits; whole numbers beyond count nothing.
     return int(text) if len(text) <= 15 else _finite(text)
+
+
+def _exact(text: str) -> int:
+    _finite(text)  # beyond is nobody's number, nor is it short enough for a name
+    return int(text)

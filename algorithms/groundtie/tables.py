@@ -88,7 +88,9 @@ def _read_csv(path: Path) -> list[dict[str, Any]]:
 
 
 def _read_nested(path: Path) -> list[dict[str, Any]]:
-    held: Any = read_json(path) if path.suffix.lower() == ".json" else _read_yaml(path)
+    is_json = path.suffix.lower() == ".json"
+    # A name may be a number, as of a time to the microsecond.
+    held: Any = read_json(path, keeps_digits=True) if is_json else _read_yaml(path)
     defaults: Any = {}
     if isinstance(held, dict):
         if set(held) - {"defaults", "rows"}:
