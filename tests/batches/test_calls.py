@@ -221,6 +221,45 @@ def test_the_key_stands_for_what_gdal_reads_beside_an_input(
     assert after.key != before.key
 
 
+@pytest.mark.parametrize(
+    ("image", "name"),
+    [
+        *(("b.tif", f"b{ending}") for ending in (".xml", ".XML", ".rpc", ".eph", ".pvl", ".IMD")),
+        ("b.TIF", "B.xml"),
+        ("IMG_P1.TIF", "RPC_P1.XML"),
+        ("IMG_P1.TIF", "DIM_P1.XML"),
+        ("IMG_P1_R2C1.TIF", "RPC_P1.XML"),
+        ("IMG_P1_R2C1.TIF", "dim_p1_r2c1.xml"),
+    ],
+)
+def test_the_key_stands_for_metadata_of_missions_beside_an_input(
+    folders: tuple[Path, Path], image: str, name: str
+) -> None:
+    (folders[0] / image).write_bytes(b"raster")
+    row = {**ROW, "input": image}
+    found = []
+    for text in ("", "1", "2"):
+        if text:
+            (folders[0] / name).write_text(text)
+            os.utime(folders[0] / name, (1, int(text)))
+        (call,) = calls_of(folders, row)
+        assert not call.problem
+        found.append(call.key)
+    assert len(set(found)) == 3
+
+
+def test_reports_and_tables_of_a_rasters_name_are_no_part_of_it(
+    folders: tuple[Path, Path],
+) -> None:
+    """Nor is any file that the row itself writes beside its input."""
+    row = {**ROW, "output": str(folders[0] / "B.tif"), "report": str(folders[0] / "b.html")}
+    (before,) = calls_of(folders, row)
+    for name in ("B.tif", "b.html", "b.json", "b.csv", "b.gpkg"):
+        (folders[0] / name).touch()
+    (after,) = calls_of(folders, row)
+    assert not after.problem and after.key == before.key
+
+
 @pytest.mark.parametrize("others", ["", "/vsizip/{0}/b.tif", "dates.csv"])
 def test_the_key_stands_for_the_archive_that_an_input_lies_in(
     folders: tuple[Path, Path], others: str
@@ -268,7 +307,7 @@ def test_a_folder_is_listed_once_for_all_rows(
 ) -> None:
     listed: list[Path] = []
 
-    def names_in(folder: Path) -> frozenset[str]:
+    def names_in(folder: Path) -> dict[str, list[str]]:
         listed.append(folder)
         return input_files.names_in(folder)
 

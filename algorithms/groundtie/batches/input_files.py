@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -13,26 +15,34 @@ from ..declaration import Tool
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..raster_names import facts_behind, local_files
-from ..rasters.atomic import SIDECARS
 from ..runs import file_facts
 from ..series.inputs import rasters_behind
 from ..vrt_sources import sources_of
 
-# What GDAL reads beside a file: behind its whole name, or in the place of its ending. GDAL itself
-# is not asked: it would open each file here, where one that kills it ends more than its row.
-_BEHIND = (*SIDECARS, ".hdr")
-_IN_PLACE = (".wld", ".tab", ".rpb", "_rpc.txt", ".imd", ".hdr", ".prj", ".dbf", ".shx", ".cpg")
+# What GDAL reads beside a file is called as that: behind its name, or in the place of its ending.
+# GDAL itself is not asked: it would open each file here, where one that kills it ends more than its
+# row. Which endings there are differs with the driver and the mission, so that all count but these:
+# what tools write, and no driver takes for a part of an image.
+_OF_NO_RASTER = (".csv", ".json", ".geojson", ".gpkg", ".html")
 
-# Returns the names of what lies in a folder.
-Listed = Callable[[Path], Collection[str]]
+# What follows the name without its ending, of RPCs and metadata of several missions.
+_MORE = ("", "_rpc", "_metadata")
+
+# What stands in the place of IMG in the names of Airbus and ALOS, whose tiles share these files.
+_OF_PRODUCT = ("dim", "rpc", "hdr")
+_TILE = re.compile(r"_r\d+c\d+$")
+
+# Returns the names of what lies in a folder, by these names without their endings in lower case.
+Listed = Callable[[Path], Mapping[str, Collection[str]]]
 
 
-def names_in(folder: Path) -> frozenset[str]:
-    """Return the names of what lies in a folder; none if it cannot be listed."""
-    try:
-        return frozenset(os.listdir(folder))
-    except OSError:
-        return frozenset()
+def names_in(folder: Path) -> dict[str, list[str]]:
+    """Return the names of what lies in a folder, by their stems; none if it cannot be listed."""
+    found: dict[str, list[str]] = {}
+    with suppress(OSError):
+        for name in sorted(os.listdir(folder)):
+            found.setdefault(Path(name).stem.lower(), []).append(name)
+    return found
 
 
 def files_read(kind: Kind, value: Any) -> Iterator[Path]:
@@ -88,12 +98,19 @@ def _facts(path: Path) -> tuple[Any, ...]:
 def _beside(path: Path, listed: Listed) -> Iterator[Path]:
     """Yield what there is beside a file that belongs to it by its name."""
     there = listed(path.parent)
-    ending = path.suffix.lower()[1:]
-    # World files: of .tif as .tfw and .tifw.
-    world = (f".{ending[0]}{ending[-1]}w", f".{ending}w") if ending else ()
-    endings = [(path.name, more) for more in _BEHIND]
-    endings += [(path.stem, more) for more in (*world, *_IN_PLACE)]
-    names = [stem + spelled for stem, more in endings for spelled in (more, more.upper())]
-    yield from (path.with_name(name) for name in names if name in there)
+    names = chain.from_iterable(there.get(stem, ()) for stem in _stems_beside(path))
+    for name in names:
+        if name != path.name and not name.lower().endswith(_OF_NO_RASTER):
+            yield path.with_name(name)
     if (mask := mask_beside(path)) is not None:
         yield mask[0]
+
+
+def _stems_beside(path: Path) -> list[str]:
+    """Return how names begin, in lower case and up to their endings, of what belongs to a file."""
+    name, stem = path.name.lower(), path.stem.lower()
+    stems = [name, f"{name}.aux", *(stem + more for more in _MORE)]
+    if stem.startswith(("img_", "img-")):
+        parts = dict.fromkeys((stem[3:], _TILE.sub("", stem[3:])))
+        stems += [kind + rest for kind in _OF_PRODUCT for rest in parts]
+    return list(dict.fromkeys(stems))
