@@ -279,7 +279,7 @@ def test_the_key_stands_for_the_archive_that_an_input_lies_in(
 def test_an_input_of_which_no_file_is_known_has_never_the_same_key(
     folders: tuple[Path, Path],
 ) -> None:
-    row = {**ROW, "input": "/vsicurl/https://host/b.tif"}
+    row = {**ROW, "input": "/vsicurl/https://host/b.tif", "output": "c.tif"}
     first, second = calls_of(folders, row, row)
     assert not first.problem and first.key != second.key
 
