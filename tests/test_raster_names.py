@@ -139,8 +139,13 @@ def test_an_archive_may_have_the_signs_of_other_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["/vsizip/none.zip/b.tif", 'NETCDF:"none.nc":b', "/vsimem/b.tif", URL, Path("none.tif")]
+    "name", ["/vsizip/none.zip/b.tif", 'NETCDF:"none.nc":b', "/vsimem/b.tif", Path("none.tif")]
 )
 def test_of_what_is_no_file_nothing_is_known(name: Path | str) -> None:
     assert isinstance(name, Path) or local_files(name) == []
     assert facts_behind(name) != facts_behind(name)
+
+
+def test_what_lies_on_a_server_counts_by_its_name() -> None:
+    assert local_files(URL) == []
+    assert facts_behind(URL) == facts_behind(URL) != facts_behind(URL.replace("b.tif", "c.tif"))

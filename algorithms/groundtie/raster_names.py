@@ -186,8 +186,11 @@ def file_on_the_way_to(path: Path) -> Path | None:
 def facts_behind(name: Path | str) -> list[tuple[Any, ...]]:
     """Return place, size and time of the files that a raster's name refers to.
 
-    Where there are none, nothing is known as unchanged: these facts are never the same again.
+    What is read over a network counts by its name. Where else there are none, nothing is known as
+    unchanged: these facts are never the same again.
     """
+    if is_remote(name):
+        return [(str(name),)]
     files = local_files(name) if isinstance(name, str) else [name]
     return [file_facts(file) for file in files if os.path.isfile(file)] or [unknown_facts(name)]
 

@@ -279,9 +279,17 @@ def test_the_key_stands_for_the_archive_that_an_input_lies_in(
 def test_an_input_of_which_no_file_is_known_has_never_the_same_key(
     folders: tuple[Path, Path],
 ) -> None:
-    row = {**ROW, "input": "/vsicurl/https://host/b.tif", "output": "c.tif"}
-    first, second = calls_of(folders, row, row)
+    row = {**ROW, "input": "/vsimem/b.tif"}
+    first, second = (calls_of(folders, row)[0] for _ in range(2))
     assert not first.problem and first.key != second.key
+
+
+def test_an_input_on_a_server_counts_by_its_name(folders: tuple[Path, Path]) -> None:
+    keys = [
+        calls_of(folders, {**ROW, "input": f"/vsicurl/https://host/{name}"})[0].key
+        for name in ("b.tif", "b.tif", "c.tif")
+    ]
+    assert keys[0] == keys[1] != keys[2]
 
 
 @pytest.mark.parametrize("is_nested", [False, True])

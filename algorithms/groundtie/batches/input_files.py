@@ -63,7 +63,7 @@ def facts_read(
 ) -> list[tuple[Any, ...]]:
     """Return place, size and time of all files that a call reads, as a key can hold them.
 
-    What lies where no file's time is known, as on a server, is never the same.
+    What lies on a server counts by its name; what lies where no file is found is never the same.
 
     Parameters
     ----------

@@ -221,7 +221,8 @@ def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
     """Return what a raster's pixels and their place come from: the files behind it, what it states.
 
     Programs that show a raster write statistics into its `.aux.xml`: of that counts what else the
-    raster states by it. What lies where no file's time is known, as on a server, is never the same.
+    raster states by it. What lies on a server counts by its name and what it states; what lies
+    where no file is found is never the same.
 
     Parameters
     ----------
