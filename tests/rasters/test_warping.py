@@ -6,6 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import rasterio.warp
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -126,6 +127,46 @@ def test_nearest_takes_the_nearest() -> None:
     values, known = resample(image, np.ones((3, 4), bool), px, "nearest")
     assert known.tolist() == [[True, True, True, False]]
     assert (values[0, :3] - 2**60).tolist() == [0, 5, 11]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-8])
+@pytest.mark.parametrize(("dx", "dy"), [(0.5, 0.0), (-0.5, 0.5), (1.5, -2.5), (0.0, -0.5)])
+def test_halfway_between_pixels_nearest_takes_those_of_gdal(
+    dx: float, dy: float, noise: float
+) -> None:
+    """Each pixel once, however rounding moves the positions, and whichever window is read."""
+    image = np.arange(1, 1201, dtype=np.uint16).reshape(30, 40)
+    place = Affine(10, 0, 500_000, 0, -10, 5_000_000)
+    expected = np.zeros_like(image)
+    rasterio.warp.reproject(
+        image,
+        expected,
+        src_transform=place,
+        dst_transform=compose(place, Affine.translation(dx, dy)),
+        src_crs="EPSG:32633",
+        dst_crs="EPSG:32633",
+        resampling=rasterio.warp.Resampling.nearest,
+    )
+    px = np.stack(np.meshgrid(np.arange(40.0) + dx, np.arange(30.0) + dy))
+    px += RNG.uniform(-noise, noise, px.shape)
+    for corner in ((0, 0), (1, 0), (0, 1)):
+        part = px - np.reshape(corner, (2, 1, 1))
+        window = image[corner[1] :, corner[0] :]
+        found = resample(window, np.ones(window.shape, bool), part, "nearest")[0]
+        inner = (slice(4, -4),) * 2
+        np.testing.assert_array_equal(found[inner], expected[inner])
+    whole = resample(image, np.ones(image.shape, bool), px, "nearest")[0]
+    np.testing.assert_array_equal(whole, expected)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_void_of_a_pixel_stays_one_halfway(method: str) -> None:
+    valid = np.ones((20, 40), bool)
+    valid[:, [10, 21]] = False
+    px = np.stack(np.meshgrid(np.arange(2, 38) + 0.5, np.arange(5.0, 10.0)))
+    _, known = resample(np.ones(valid.shape, np.float32), valid, px, method)
+    for row in known:
+        assert px[0, 0, ~row].tolist() == [9.5, 20.5]
 
 
 @pytest.mark.parametrize("method", METHODS)

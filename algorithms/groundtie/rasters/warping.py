@@ -81,7 +81,7 @@ def _resample(
     if method != "nearest" and valid.all() and are_inside(px, valid.shape, REACH[method]):
         values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
         return rounded(values, dtype), np.ones(px.shape[1:], bool)
-    nearest = np.rint(px)
+    nearest = _nearest_pixels(px)
     known, whole = _validity(valid, nearest, REACH[method])
     if method == "nearest":
         cols, rows = np.where(known, nearest, 0).astype(np.intp)
@@ -96,6 +96,15 @@ def _resample(
         values[..., partly] = (interpolate(filled, there, "bilinear") / weight)[..., 0, :]
     values[..., ~known] = 0
     return rounded(values, dtype), known
+
+
+def _nearest_pixels(px: NDArray[Any]) -> NDArray[Any]:
+    """Return the columns or rows of the pixels nearest to positions, as floating-point numbers.
+
+    Halfway between two it is the further one, as GDAL has it: by the even one, every second pixel
+    of an image moved by half a pixel would be lost. Halfway lies what rounding may have moved.
+    """
+    return np.floor(px + (0.5 + ON_PIXELS))
 
 
 def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
