@@ -251,11 +251,24 @@ class TestAcrossTheAntimeridian:
         found = self.GRID.to_own_map(xy, WGS84)
         np.testing.assert_array_equal(found, xy)
 
-    @pytest.mark.parametrize("left", [-180.0, 0.0])
-    def test_a_grid_of_the_whole_earth_is_as_its_crs_has_it(self, left: float) -> None:
-        grid = Grid(Affine(1, 0, left, 0, -1, 90), WGS84, 360, 180)
-        xy = np.array([[-179.9, 1.0], [-0.1, 2.0], [0.1, 3.0], [359.9, 4.0]])
-        np.testing.assert_array_equal(grid.to_own_map(xy, WGS84), xy)
+    @pytest.mark.parametrize(
+        ("left", "width", "expected"),
+        [
+            (-180.0, 360, [-179.9, -0.1, 0.1, -0.1, -70.0]),
+            (0.0, 360, [180.1, 359.9, 0.1, 359.9, 290.0]),
+            (200.0, 100, [180.1, 359.9, 360.1, 359.9, 290.0]),
+            (-100.0, 50, [-179.9, -0.1, 0.1, -0.1, -70.0]),
+        ],
+    )
+    def test_longitudes_are_counted_as_a_grid_anywhere_does(
+        self, left: float, width: int, expected: list[float]
+    ) -> None:
+        """Also of the whole Earth, from -180° or, as climate models have it, from 0°."""
+        grid = Grid(Affine(1, 0, left, 0, -1, 90), WGS84, width, 180)
+        xy = np.array([[-179.9, 1.0], [-0.1, 2.0], [0.1, 3.0], [359.9, 4.0], [-70.0, -30.0]])
+        found = grid.to_own_map(xy, WGS84)
+        np.testing.assert_allclose(found, np.column_stack([expected, xy[:, 1]]), rtol=1e-12)
+        assert grid.covers(found)[4]
 
 
 def test_reprojecting_there_and_back() -> None:

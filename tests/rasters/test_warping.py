@@ -11,6 +11,7 @@ from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from raster_files import utm_grid, wave_image, waves, write_raster
+from rasterio.crs import CRS
 
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.lattice import coordinates, lattice
@@ -188,8 +189,8 @@ def test_nodata_never_bleeds(method: str, nodata: float) -> None:
 @given(
     method=st.sampled_from(METHODS),
     seed=st.integers(0, 99),
-    dx=st.floats(-3, 3),
-    dy=st.floats(-3, 3),
+    dx=st.integers(-96, 96).map(lambda n: n / 32),
+    dy=st.integers(-96, 96).map(lambda n: n / 32),
 )
 def test_valid_exactly_where_the_nearest_pixel_is(
     method: str, seed: int, dx: float, dy: float
@@ -200,7 +201,7 @@ def test_valid_exactly_where_the_nearest_pixel_is(
     cols, rows = np.meshgrid(np.arange(14) + dx, np.arange(12) + dy)
     values, known = resample(image, valid, np.stack([cols, rows]), method)
     padded = np.pad(valid, 8)
-    expected = padded[np.rint(rows).astype(int) + 8, np.rint(cols).astype(int) + 8]
+    expected = padded[np.floor(rows + 8.5).astype(int), np.floor(cols + 8.5).astype(int)]
     np.testing.assert_array_equal(known, expected)
     assert not values[~known].any()
     if method in ("nearest", "bilinear") and known.any():
@@ -303,3 +304,24 @@ def test_sampling_beside_the_raster_is_empty(tmp_path: Path) -> None:
     values, valid = sample(source, grid.window(500, 500, 7, 6), grid.map_to_pixel)
     assert values.shape == valid.shape == (6, 7)
     assert not valid.any()
+
+
+@pytest.mark.parametrize("method", ["nearest", "cubic"])
+@pytest.mark.parametrize(("own", "other"), [(-180.0, 0.0), (0.0, -180.0), (0.0, 0.0)])
+def test_the_whole_earth_is_found_however_longitudes_are_counted(
+    tmp_path: Path, own: float, other: float, method: str
+) -> None:
+    """In the middle of the one map the other one begins: no pixel spans the Earth there."""
+    grid, onto = (
+        Grid(Affine(0.5, 0, west, 0, -0.5, 90), CRS.from_epsg(4326), 720, 360)
+        for west in (own, other)
+    )
+    image, expected = (
+        (each.pixel_to_map(each.lattice(1))[0, 0] + 0.5 * np.arange(720) + 180) % 360
+        for each in (grid, onto)
+    )
+    path = write_raster(tmp_path / "a.tif", np.tile(image.astype(np.float32), (360, 1)), grid)
+    with open_raster(path) as source:
+        values, valid = sample(source, onto, onto.to_pixels_of(grid), method)
+    assert valid.all()
+    np.testing.assert_array_equal(values, np.tile(expected.astype(np.float32), (360, 1)))

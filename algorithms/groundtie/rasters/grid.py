@@ -113,12 +113,11 @@ class Grid:
     def to_own_map(self, xy: FloatArray, crs: CRS | None) -> FloatArray:
         """Return positions of another CRS, shape (n, 2), on this grid's map, as `reproject`.
 
-        Where the grid lies across the antimeridian, longitudes go on beyond it as the grid's do.
+        Longitudes are counted as the grid's are, not more than half a turn from its middle: from
+        -180° or from 0°, or beyond the antimeridian.
         """
-        moved = reproject(xy, crs, self.crs)
-        if not self._is_across_antimeridian:
-            return moved
-        return near_longitude(moved, self.pixel_to_map([self.centre_px])[0, 0], self.crs)
+        middle = self.pixel_to_map([self.centre_px])[0, 0]
+        return near_longitude(reproject(xy, crs, self.crs), middle, self.crs)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -165,15 +164,6 @@ class Grid:
         if 'PROJECTION["Mercator' not in self.crs.to_wkt() and _is_for_surveys(scale):
             return unit_m, unit_m
         return scale[0] * unit_m, scale[1] * unit_m
-
-    @cached_property
-    def _is_across_antimeridian(self) -> bool:
-        turn = full_turn(self.crs)
-        if turn is None:
-            return False
-        longitudes = apply_affine(self.centre_transform, self.outline(1))[:, 0]
-        # Of the whole Earth there is no other side that positions could be taken for.
-        return bool(np.abs(longitudes).max() > turn / 2 and np.ptp(longitudes) < turn / 2)
 
     @cached_property
     def pixel_size_m(self) -> float:

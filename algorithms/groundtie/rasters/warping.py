@@ -140,15 +140,24 @@ def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> 
     No more than the input's width and height, `size`.
     """
     col, row = grid.centre_px
-    around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
-    left, right, above, below = to_input_px(grid.pixel_to_map(around))
-    if not np.isfinite([left, right, above, below]).all():
+    span = _span(grid, to_input_px, col, row)
+    if not np.isfinite(span).all():
         return 1, 1
-    span = np.hypot(right - left, below - above)
+    if span[0] > size[0] / 2:
+        # An input of the whole Earth may end there and begin anew, but not beside it, too.
+        span = np.fmin(span, _span(grid, to_input_px, col - 1, row))
     cols, rows = (
         max(round(min(float(length), most)), 1) for length, most in zip(span, size, strict=True)
     )
     return cols, rows
+
+
+def _span(grid: Grid, to_input_px: PointFunction, col: float, row: float) -> FloatArray:
+    """Return how many input columns and rows a pixel spans, (2,); not finite if that is unknown."""
+    around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
+    left, right, above, below = to_input_px(grid.pixel_to_map(around))
+    with np.errstate(invalid="ignore"):  # positions outside of a projection's domain
+        return np.asarray(np.hypot(right - left, below - above))
 
 
 def source_window(
