@@ -154,10 +154,61 @@ def test_metres_of_mercator_maps_are_those_on_the_ground(
     np.testing.assert_allclose(grid.metres_per_unit, metres / scale, rtol=1e-4)
 
 
-def test_no_unit_of_a_projection_that_keeps_lengths_is_changed() -> None:
-    for code in (32633, 3035, 31467, 3031, 2056):
-        grid = Grid(Affine(10, 0, 5e5, 0, -10, 5e6), CRS.from_epsg(code), 10, 10)
-        assert grid.metres_per_unit == (1.0, 1.0)
+@pytest.mark.parametrize(
+    ("text", "lon", "latitude"),
+    [
+        ("EPSG:32662", 10.0, 60.0),
+        ("EPSG:4087", 10.0, 60.0),
+        ("EPSG:4087", 180.0, -35.0),
+        ("EPSG:6933", 10.0, 60.0),
+        ("EPSG:6933", -70.0, 5.0),
+        ("EPSG:3413", 20.0, 80.0),
+        ("EPSG:3995", -100.0, 62.0),
+        ("EPSG:3031", 0.0, -90.0),
+        ("ESRI:54009", 100.0, 50.0),
+        ("+proj=eqc +lat_ts=30 +datum=WGS84 +units=us-ft", 10.0, 60.0),
+    ],
+)
+def test_metres_of_any_map_are_those_on_the_ground(text: str, lon: float, latitude: float) -> None:
+    """By an azimuthal map around the place: along x, and in area."""
+    crs = CRS.from_user_input(text)
+    around = CRS.from_user_input(f"+proj=aeqd +lat_0={latitude} +lon_0={lon} +datum=WGS84")
+    (x, y) = reproject(np.array([[lon, latitude]]), WGS84, crs)[0]
+    grid = Grid(Affine(100, 0, x - 5000, 0, -100, y + 5000), crs, 100, 100)
+    sides = grid.pixel_to_map([[49, 49.5], [50, 49.5], [49.5, 49], [49.5, 50]])
+    left, right, above, below = reproject(sides, crs, around)
+    width, area = np.hypot(*(right - left)), abs(np.linalg.det([right - left, below - above]))
+    np.testing.assert_allclose(grid.pixel_sides_m, (width, area / width), rtol=1e-4)
+    assert grid.pixel_size_m == pytest.approx(np.sqrt(area), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("EPSG:32633", (5e5, 5e6)),
+        ("EPSG:32633", (8.3e5, 1e5)),
+        ("EPSG:3035", (4.3e6, 3.2e6)),
+        ("EPSG:31467", (3.5e6, 5.5e6)),
+        ("EPSG:2056", (2.6e6, 1.2e6)),
+        ("EPSG:2154", (1.2e6, 6.1e6)),
+        ("EPSG:5070", (0.0, 2.5e6)),
+        # Sheared: areas and lengths along x are kept.
+        ("+proj=sinu +R=6371007.181", (7e6, 5.5e6)),
+    ],
+)
+def test_no_unit_of_a_projection_that_keeps_lengths_is_changed(
+    text: str, place: tuple[float, float]
+) -> None:
+    grid = Grid(Affine(10, 0, place[0], 0, -10, place[1]), CRS.from_user_input(text), 10, 10)
+    assert grid.metres_per_unit == (1.0, 1.0)
+
+
+def test_units_of_a_map_that_nothing_leads_from_are_what_they_say() -> None:
+    """Of another planet, or far outside of the projection's domain."""
+    mars = CRS.from_user_input("+proj=eqc +R=3396190 +units=m")
+    assert Grid(Affine(10, 0, 0, 0, -10, 3e6), mars, 10, 10).metres_per_unit == (1.0, 1.0)
+    far = Grid(Affine(10, 0, 1e12, 0, -10, 1e12), CRS.from_epsg(3035), 10, 10)
+    assert far.metres_per_unit == (1.0, 1.0)
 
 
 def test_far_off_a_mercator_map_units_have_a_length() -> None:
@@ -200,11 +251,24 @@ class TestAcrossTheAntimeridian:
         found = self.GRID.to_own_map(xy, WGS84)
         np.testing.assert_array_equal(found, xy)
 
-    @pytest.mark.parametrize("left", [-180.0, 0.0])
-    def test_a_grid_of_the_whole_earth_is_as_its_crs_has_it(self, left: float) -> None:
-        grid = Grid(Affine(1, 0, left, 0, -1, 90), WGS84, 360, 180)
-        xy = np.array([[-179.9, 1.0], [-0.1, 2.0], [0.1, 3.0], [359.9, 4.0]])
-        np.testing.assert_array_equal(grid.to_own_map(xy, WGS84), xy)
+    @pytest.mark.parametrize(
+        ("left", "width", "expected"),
+        [
+            (-180.0, 360, [-179.9, -0.1, 0.1, -0.1, -70.0]),
+            (0.0, 360, [180.1, 359.9, 0.1, 359.9, 290.0]),
+            (200.0, 100, [180.1, 359.9, 360.1, 359.9, 290.0]),
+            (-100.0, 50, [-179.9, -0.1, 0.1, -0.1, -70.0]),
+        ],
+    )
+    def test_longitudes_are_counted_as_a_grid_anywhere_does(
+        self, left: float, width: int, expected: list[float]
+    ) -> None:
+        """Also of the whole Earth, from -180° or, as climate models have it, from 0°."""
+        grid = Grid(Affine(1, 0, left, 0, -1, 90), WGS84, width, 180)
+        xy = np.array([[-179.9, 1.0], [-0.1, 2.0], [0.1, 3.0], [359.9, 4.0], [-70.0, -30.0]])
+        found = grid.to_own_map(xy, WGS84)
+        np.testing.assert_allclose(found, np.column_stack([expected, xy[:, 1]]), rtol=1e-12)
+        assert grid.covers(found)[4]
 
 
 def test_reprojecting_there_and_back() -> None:

@@ -6,10 +6,12 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import rasterio.warp
 from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from raster_files import utm_grid, wave_image, waves, write_raster
+from rasterio.crs import CRS
 
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 from groundtie.rasters.lattice import coordinates, lattice
@@ -128,6 +130,46 @@ def test_nearest_takes_the_nearest() -> None:
     assert (values[0, :3] - 2**60).tolist() == [0, 5, 11]
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-8])
+@pytest.mark.parametrize(("dx", "dy"), [(0.5, 0.0), (-0.5, 0.5), (1.5, -2.5), (0.0, -0.5)])
+def test_halfway_between_pixels_nearest_takes_those_of_gdal(
+    dx: float, dy: float, noise: float
+) -> None:
+    """Each pixel once, however rounding moves the positions, and whichever window is read."""
+    image = np.arange(1, 1201, dtype=np.uint16).reshape(30, 40)
+    place = Affine(10, 0, 500_000, 0, -10, 5_000_000)
+    expected = np.zeros_like(image)
+    rasterio.warp.reproject(
+        image,
+        expected,
+        src_transform=place,
+        dst_transform=compose(place, Affine.translation(dx, dy)),
+        src_crs="EPSG:32633",
+        dst_crs="EPSG:32633",
+        resampling=rasterio.warp.Resampling.nearest,
+    )
+    px = np.stack(np.meshgrid(np.arange(40.0) + dx, np.arange(30.0) + dy))
+    px += RNG.uniform(-noise, noise, px.shape)
+    for corner in ((0, 0), (1, 0), (0, 1)):
+        part = px - np.reshape(corner, (2, 1, 1))
+        window = image[corner[1] :, corner[0] :]
+        found = resample(window, np.ones(window.shape, bool), part, "nearest")[0]
+        inner = (slice(4, -4),) * 2
+        np.testing.assert_array_equal(found[inner], expected[inner])
+    whole = resample(image, np.ones(image.shape, bool), px, "nearest")[0]
+    np.testing.assert_array_equal(whole, expected)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_void_of_a_pixel_stays_one_halfway(method: str) -> None:
+    valid = np.ones((20, 40), bool)
+    valid[:, [10, 21]] = False
+    px = np.stack(np.meshgrid(np.arange(2, 38) + 0.5, np.arange(5.0, 10.0)))
+    _, known = resample(np.ones(valid.shape, np.float32), valid, px, method)
+    for row in known:
+        assert px[0, 0, ~row].tolist() == [9.5, 20.5]
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("nodata", [-9999.0, 1e30])
 def test_nodata_never_bleeds(method: str, nodata: float) -> None:
@@ -147,8 +189,8 @@ def test_nodata_never_bleeds(method: str, nodata: float) -> None:
 @given(
     method=st.sampled_from(METHODS),
     seed=st.integers(0, 99),
-    dx=st.floats(-3, 3),
-    dy=st.floats(-3, 3),
+    dx=st.integers(-96, 96).map(lambda n: n / 32),
+    dy=st.integers(-96, 96).map(lambda n: n / 32),
 )
 def test_valid_exactly_where_the_nearest_pixel_is(
     method: str, seed: int, dx: float, dy: float
@@ -159,7 +201,7 @@ def test_valid_exactly_where_the_nearest_pixel_is(
     cols, rows = np.meshgrid(np.arange(14) + dx, np.arange(12) + dy)
     values, known = resample(image, valid, np.stack([cols, rows]), method)
     padded = np.pad(valid, 8)
-    expected = padded[np.rint(rows).astype(int) + 8, np.rint(cols).astype(int) + 8]
+    expected = padded[np.floor(rows + 8.5).astype(int), np.floor(cols + 8.5).astype(int)]
     np.testing.assert_array_equal(known, expected)
     assert not values[~known].any()
     if method in ("nearest", "bilinear") and known.any():
@@ -262,3 +304,24 @@ def test_sampling_beside_the_raster_is_empty(tmp_path: Path) -> None:
     values, valid = sample(source, grid.window(500, 500, 7, 6), grid.map_to_pixel)
     assert values.shape == valid.shape == (6, 7)
     assert not valid.any()
+
+
+@pytest.mark.parametrize("method", ["nearest", "cubic"])
+@pytest.mark.parametrize(("own", "other"), [(-180.0, 0.0), (0.0, -180.0), (0.0, 0.0)])
+def test_the_whole_earth_is_found_however_longitudes_are_counted(
+    tmp_path: Path, own: float, other: float, method: str
+) -> None:
+    """In the middle of the one map the other one begins: no pixel spans the Earth there."""
+    grid, onto = (
+        Grid(Affine(0.5, 0, west, 0, -0.5, 90), CRS.from_epsg(4326), 720, 360)
+        for west in (own, other)
+    )
+    image, expected = (
+        (each.pixel_to_map(each.lattice(1))[0, 0] + 0.5 * np.arange(720) + 180) % 360
+        for each in (grid, onto)
+    )
+    path = write_raster(tmp_path / "a.tif", np.tile(image.astype(np.float32), (360, 1)), grid)
+    with open_raster(path) as source:
+        values, valid = sample(source, onto, onto.to_pixels_of(grid), method)
+    assert valid.all()
+    np.testing.assert_array_equal(values, np.tile(expected.astype(np.float32), (360, 1)))

@@ -20,8 +20,6 @@ from ..rasters.grid import (
     apply_affine,
     compose,
     mesh,
-    near_longitude,
-    reproject,
     require_both_or_none,
 )
 from ..rasters.height_surfaces import RasterSurface, surface_around
@@ -109,7 +107,7 @@ class Terrain:
             if surface is None:
                 continue
             own = surface.source.grid
-            known = own.contains(_pixels_of(own, xy, crs))
+            known = own.covers(own.to_own_map(xy, crs))
             if not known.all():
                 raise NoOverlapError(
                     f"{surface.source.path} covers only {100 * known.mean():.0f} % of where the "
@@ -126,12 +124,6 @@ class Terrain:
         }
 
 
-def _pixels_of(grid: Grid, xy: FloatArray, crs: CRS | None) -> FloatArray:
-    """Return pixels of a grid, longitudes counted as it does: from -180° or from 0°, (n, 2)."""
-    middle = grid.pixel_to_map([grid.centre_px])[0, 0]
-    return grid.map_to_pixel(near_longitude(reproject(xy, crs, grid.crs), middle, grid.crs))
-
-
 def _surface(
     raster: Any, crs: CRS | None, region: tuple[float, float, float, float]
 ) -> RasterSurface:
@@ -143,7 +135,7 @@ def _surface(
     last = np.array(grid.size) - 1
 
     def to_px(xy: FloatArray) -> FloatArray:
-        px = _pixels_of(grid, xy, crs)
+        px = grid.map_to_pixel(grid.to_own_map(xy, crs))
         asked = np.all((xy >= [left, bottom]) & (xy <= [right, top]), axis=1)
         return np.where(asked[:, None], np.clip(px, 0, last), px)
 

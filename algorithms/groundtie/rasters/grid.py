@@ -44,6 +44,11 @@ _DATUM = re.compile(r'DATUM\["[^"]*"|TOWGS84\[[^]]*\]')
 _RADIUS_M, FLATTENING = 6_378_137.0, 1 / 298.257223563
 _ECCENTRICITY2 = FLATTENING * (2 - FLATTENING)
 
+# The scale of maps for surveys is nearer than this to 1, and their unit is taken as what it says.
+# That of UTM goes from 0.9996 at a zone's middle to 1.001 at its borders, 3° off: (3°)² / 2 is
+# 0.0014. National grids have as much, or a few times as much where they span a large country.
+_SURVEY_SCALE = 0.01
+
 # Steps over which the length of a map's units is measured.
 _STEP_M = 1000.0
 
@@ -108,12 +113,11 @@ class Grid:
     def to_own_map(self, xy: FloatArray, crs: CRS | None) -> FloatArray:
         """Return positions of another CRS, shape (n, 2), on this grid's map, as `reproject`.
 
-        Where the grid lies across the antimeridian, longitudes go on beyond it as the grid's do.
+        Longitudes are counted as the grid's are, not more than half a turn from its middle: from
+        -180° or from 0°, or beyond the antimeridian.
         """
-        moved = reproject(xy, crs, self.crs)
-        if not self._is_across_antimeridian:
-            return moved
-        return near_longitude(moved, self.pixel_to_map([self.centre_px])[0, 0], self.crs)
+        middle = self.pixel_to_map([self.centre_px])[0, 0]
+        return near_longitude(reproject(xy, crs, self.crs), middle, self.crs)
 
     def contains(self, px: ArrayLike) -> NDArray[np.bool_]:
         """Return for each pixel position, shape (n, 2), whether it lies on a pixel of this grid."""
@@ -144,7 +148,10 @@ class Grid:
 
     @cached_property
     def metres_per_unit(self) -> tuple[float, float]:
-        """Metres per map unit along x and y at the grid's centre (1 without a CRS)."""
+        """Metres per map unit along x and y at the grid's centre (1 without a CRS).
+
+        Of a map that is sheared there, y counts at right angles to x, so that areas are right.
+        """
         if self.crs is None:
             return 1.0, 1.0
         centre = self.pixel_to_map([self.centre_px])[0]
@@ -152,19 +159,11 @@ class Grid:
             degrees = _degrees_per_unit(self.crs)
             shrink = max(float(np.cos(np.deg2rad(centre[1] * degrees))), _LEAST_SHRINK)
             return METRES_PER_DEGREE * degrees * shrink, METRES_PER_DEGREE * degrees
-        factor = float(self.crs.linear_units_factor[1])
-        if 'PROJECTION["Mercator' in self.crs.to_wkt():
-            return _metres_on_the_ground(centre, factor, self.crs)
-        return factor, factor
-
-    @cached_property
-    def _is_across_antimeridian(self) -> bool:
-        turn = full_turn(self.crs)
-        if turn is None:
-            return False
-        longitudes = apply_affine(self.centre_transform, self.outline(1))[:, 0]
-        # Of the whole Earth there is no other side that positions could be taken for.
-        return bool(np.abs(longitudes).max() > turn / 2 and np.ptp(longitudes) < turn / 2)
+        unit_m = float(self.crs.linear_units_factor[1])
+        scale = _scale_on_the_ground(centre, unit_m, self.crs)
+        if 'PROJECTION["Mercator' not in self.crs.to_wkt() and _is_for_surveys(scale):
+            return unit_m, unit_m
+        return scale[0] * unit_m, scale[1] * unit_m
 
     @cached_property
     def pixel_size_m(self) -> float:
@@ -334,27 +333,37 @@ def _degrees_per_unit(crs: CRS) -> float:
     return round(float(np.rad2deg(crs.units_factor[1])), 12)
 
 
-def _metres_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:
-    """Return the metres on the ground per unit of a map along x and y at a position.
+def _is_for_surveys(scale: tuple[float, float]) -> bool:
+    return max(abs(scale[0] - 1), abs(scale[1] - 1)) <= _SURVEY_SCALE
 
-    For maps whose scale differs much from place to place; `unit_m` is that of the unit itself.
+
+def _scale_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:
+    """Return how many times as long as its unit, in metres, a projected map's units are.
+
+    At a position, along x and at right angles to that; 1 where nothing leads to the ground.
     """
-    step = _STEP_M / unit_m
-    along = np.array([[-0.5, 0], [0.5, 0], [0, -0.5], [0, 0.5]]) * step
-    lon_lat = np.deg2rad(reproject(centre + along, crs, LON_LAT))
-    if not np.isfinite(lon_lat).all():
-        return unit_m, unit_m
-    latitude = lon_lat[2:, 1].mean()
-    # Radii of curvature: of the prime vertical, and of the meridian
-    bent = 1 - _ECCENTRICITY2 * np.sin(latitude) ** 2
-    across_m = _RADIUS_M / np.sqrt(bent) * np.cos(latitude)
-    along_m = _RADIUS_M * (1 - _ECCENTRICITY2) / bent**1.5
-    # West of the antimeridian is -180°.
-    turn = np.remainder(lon_lat[1, 0] - lon_lat[0, 0] + np.pi, 2 * np.pi) - np.pi
-    rise = lon_lat[3, 1] - lon_lat[2, 1]
-    x, y = np.abs([turn * across_m, rise * along_m]) / step
-    least = _LEAST_SHRINK * unit_m
-    return max(float(x), least), max(float(y), least)
+    along = np.array([[-0.5, 0], [0, -0.5], [0.5, 0], [0, 0.5]]) * (_STEP_M / unit_m)
+    before, after = np.split(_earth_centred(reproject(centre + along, crs, LON_LAT)), 2)
+    if not np.isfinite([before, after]).all():
+        return 1.0, 1.0
+    x, y = (after - before) / _STEP_M
+    width = max(float(np.linalg.norm(x)), _LEAST_SHRINK)
+    height = float(np.linalg.norm(np.cross(x, y))) / width
+    return width, max(height, _LEAST_SHRINK)
+
+
+def _earth_centred(lon_lat: FloatArray) -> FloatArray:
+    """Return places, (n, 2) in degrees, as x, y and z from the middle of the Earth, (n, 3).
+
+    So distances meet neither poles nor an antimeridian.
+    """
+    # Positions outside of a projection's domain are infinite.
+    with np.errstate(invalid="ignore"):
+        lon, lat = np.deg2rad(lon_lat).T
+        # Radius of curvature of the prime vertical
+        radius = _RADIUS_M / np.sqrt(1 - _ECCENTRICITY2 * np.sin(lat) ** 2)
+        across, up = radius * np.cos(lat), radius * (1 - _ECCENTRICITY2) * np.sin(lat)
+        return np.column_stack([across * np.cos(lon), across * np.sin(lon), up])
 
 
 def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> tuple[float, float]:

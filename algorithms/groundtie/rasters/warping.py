@@ -81,7 +81,7 @@ def _resample(
     if method != "nearest" and valid.all() and are_inside(px, valid.shape, REACH[method]):
         values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
         return rounded(values, dtype), np.ones(px.shape[1:], bool)
-    nearest = np.rint(px)
+    nearest = _nearest_pixels(px)
     known, whole = _validity(valid, nearest, REACH[method])
     if method == "nearest":
         cols, rows = np.where(known, nearest, 0).astype(np.intp)
@@ -96,6 +96,15 @@ def _resample(
         values[..., partly] = (interpolate(filled, there, "bilinear") / weight)[..., 0, :]
     values[..., ~known] = 0
     return rounded(values, dtype), known
+
+
+def _nearest_pixels(px: NDArray[Any]) -> NDArray[Any]:
+    """Return the columns or rows of the pixels nearest to positions, as floating-point numbers.
+
+    Halfway between two it is the further one, as GDAL has it: by the even one, every second pixel
+    of an image moved by half a pixel would be lost. Halfway lies what rounding may have moved.
+    """
+    return np.floor(px + (0.5 + ON_PIXELS))
 
 
 def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
@@ -131,15 +140,24 @@ def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> 
     No more than the input's width and height, `size`.
     """
     col, row = grid.centre_px
-    around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
-    left, right, above, below = to_input_px(grid.pixel_to_map(around))
-    if not np.isfinite([left, right, above, below]).all():
+    span = _span(grid, to_input_px, col, row)
+    if not np.isfinite(span).all():
         return 1, 1
-    span = np.hypot(right - left, below - above)
+    if span[0] > size[0] / 2:
+        # An input of the whole Earth may end there and begin anew, but not beside it, too.
+        span = np.fmin(span, _span(grid, to_input_px, col - 1, row))
     cols, rows = (
         max(round(min(float(length), most)), 1) for length, most in zip(span, size, strict=True)
     )
     return cols, rows
+
+
+def _span(grid: Grid, to_input_px: PointFunction, col: float, row: float) -> FloatArray:
+    """Return how many input columns and rows a pixel spans, (2,); not finite if that is unknown."""
+    around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
+    left, right, above, below = to_input_px(grid.pixel_to_map(around))
+    with np.errstate(invalid="ignore"):  # positions outside of a projection's domain
+        return np.asarray(np.hypot(right - left, below - above))
 
 
 def source_window(

@@ -15,7 +15,7 @@ from ..geometry.transform import FloatArray, Transform
 from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
-from ..rasters.grid import Grid, PointFunction
+from ..rasters.grid import Grid, PointFunction, near_longitude, reproject
 from ..rasters.reading import Mask, RasterSource
 from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT
@@ -176,12 +176,19 @@ def resampled_onto(
     """
     if grid == REFERENCE_GRID:
         return transform.of_map(reference.crs), reference
-    crs = source.grid.crs
+    own = source.grid
+    return transform.of_map(own.crs), registered_grid(
+        own, lambda px: _registered_px(px, own, transform), own.crs
+    )
 
-    def px_to_own_map(px: FloatArray) -> FloatArray:
-        return source.grid.to_own_map(transform.inverse(px), transform.crs)
 
-    return transform.of_map(crs), registered_grid(source.grid, px_to_own_map, crs)
+def _registered_px(px: FloatArray, own: Grid, transform: Transform) -> FloatArray:
+    """Return where pixels of an input, shape (n, 2), belong on its own map.
+
+    With longitudes near to where it has them: the borders of the whole Earth may move beyond it.
+    """
+    xy = reproject(transform.inverse(px), transform.crs, own.crs)
+    return near_longitude(xy, own.pixel_to_map(px)[:, :1], own.crs)
 
 
 def grid_of_output(output: Path | None, asked: str) -> str:
@@ -214,8 +221,7 @@ def moved_grid(transform: Transform) -> Grid:
     """
     grid = transform.input_grid
     px = grid.outline(3)
-    xy = grid.to_own_map(transform.inverse(px), transform.crs)
-    shifts = xy - grid.pixel_to_map(px)
+    shifts = _registered_px(px, grid, transform) - grid.pixel_to_map(px)
     dx, dy = shifts.mean(axis=0)
     if np.abs(shifts - [dx, dy]).max() > UNTOUCHED_TOLERANCE_PX * min(grid.pixel_size):
         raise ParameterError(

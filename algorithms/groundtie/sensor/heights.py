@@ -19,7 +19,6 @@ from ..rasters.grid import (
     Grid,
     PointFunction,
     near_longitude,
-    reproject,
 )
 from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
 from ..rasters.lattice import Lattice
@@ -239,12 +238,13 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     NoOverlapError, RasterContentError
         See `surface_around`.
     """
-    grid, crs = source.grid, require_crs(source)
+    require_crs(source)
+    grid = source.grid
     corner, opposite = lon_lat.min(axis=0), lon_lat.max(axis=0)
-    middle, own_middle = (corner + opposite)[0] / 2, grid.pixel_to_map([grid.centre_px])[0, 0]
+    middle = (corner + opposite)[0] / 2
 
     def exact(places: FloatArray) -> FloatArray:
-        xy = near_longitude(reproject(places, LON_LAT, crs), own_middle, crs)
+        xy = grid.to_own_map(places, LON_LAT)
         return grid.map_to_pixel(np.where(np.isfinite(xy), xy, np.nan))
 
     surface = surface_around(source, exact, lon_lat, fill_open=False)
