@@ -34,6 +34,7 @@ from groundtie.registration.rules.survey import (
     deviations_of_rest,
     has_few_chips,
     height_of_else,
+    peak_of_unexplained,
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
@@ -139,6 +140,11 @@ STATISTICS = (
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
+    Statistic(
+        "unexplained elsewhere: peak",
+        PEAK_DEVIATIONS,
+        lambda evidence: peak_of_unexplained(evidence.surveys)[0],
+    ),
     Statistic(
         "rest elsewhere: second peak",
         REST_PEAK_DEVIATIONS,

@@ -13,6 +13,7 @@ from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
+from .phase_survey import PhaseSurvey, survey_phases
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
@@ -62,6 +63,8 @@ class Surveys:
         Without content that is the same in both arrays; None: none is looked for.
     ground
         Of open ground; None: the images are not two radars', or it alone takes part.
+    phases
+        Of what the reference does not explain of the input, as a whole; None as `rest`.
     fine
         Of smaller chips, which show smaller parts; None: the others are as small.
     """
@@ -69,6 +72,7 @@ class Surveys:
     whole: Survey | None = None
     rest: Rest | None = None
     ground: Survey | None = None
+    phases: PhaseSurvey | None = None
     fine: Survey | None = None
 
     @property
@@ -109,14 +113,15 @@ def survey_all(
     """
     model, elsewhere_px = transform.model, accuracy_px[0]
     whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
-    rest = ground = None
+    rest = ground = phases = None
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
+        phases = survey_phases(matcher.pair, transform, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
-    return Surveys(whole, rest, ground)
+    return Surveys(whole, rest, ground, phases)
 
 
 def survey_rest(
