@@ -27,6 +27,7 @@ from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     LEAST_OF_REST,
     PEAK_DEVIATIONS,
+    PHASE_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
     deviations_beyond,
@@ -142,7 +143,7 @@ STATISTICS = (
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
     Statistic(
         "unexplained elsewhere: peak",
-        PEAK_DEVIATIONS,
+        PHASE_DEVIATIONS,
         lambda evidence: peak_of_unexplained(evidence.surveys)[0],
     ),
     Statistic(

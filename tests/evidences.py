@@ -105,7 +105,7 @@ def evidence(
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, ground, phases)
+    surveys = Surveys(survey, rest, ground, phases=phases)
     images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
     return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 

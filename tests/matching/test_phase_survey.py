@@ -13,7 +13,7 @@ from groundtie.matching.phase_survey import survey_phases
 from groundtie.matching.surveys import Surveys
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
-from groundtie.registration.rules.survey import PEAK_DEVIATIONS, peak_of_unexplained
+from groundtie.registration.rules.survey import PHASE_DEVIATIONS, peak_of_unexplained
 
 SIDE, MARGIN = 400, 30
 
@@ -48,7 +48,7 @@ def test_ground_shows_that_a_layer_over_both_images_hides(
     layer = texture(SIDE, SIDE, 8)
     reference, input = (0.7 * layer + 0.3 * place(4, *moved) for moved in ((0, 0), shift))
     height, length = peak_of(tmp_path, reference, input, context)
-    assert height > PEAK_DEVIATIONS
+    assert height > PHASE_DEVIATIONS
     assert length == pytest.approx(np.hypot(*shift), abs=0.01)
 
 
@@ -58,4 +58,4 @@ def test_what_changed_is_at_no_place_elsewhere(
 ) -> None:
     ground = place(4)
     input = (1 - changed) * ground + changed * texture(SIDE, SIDE, 9)
-    assert peak_of(tmp_path, ground, input, context)[0] < PEAK_DEVIATIONS
+    assert peak_of(tmp_path, ground, input, context)[0] < PHASE_DEVIATIONS

@@ -220,8 +220,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=2.1, rival=1.0))),
     ),
     "unexplained elsewhere": (
-        evidence(GOOD, survey=survey(), phases=phases(13.0, 13)),
-        evidence(GOOD, survey=survey(), phases=phases(11.0, 13)),
+        evidence(GOOD, survey=survey(), phases=phases(19.0, 13)),
+        evidence(GOOD, survey=survey(), phases=phases(17.0, 13)),
     ),
     "rest elsewhere": (
         evidence(

@@ -11,7 +11,7 @@ import pytest
 
 from groundtie.errors import ParameterError
 from groundtie.registration.user_masks import UserMask
-from groundtie.series.inputs import files_behind, list_dates, time_of
+from groundtie.series.inputs import list_dates, rasters_behind, time_of
 from groundtie.stac_items import stated_time
 
 DAY = datetime.datetime(2020, 3, 4)
@@ -234,7 +234,7 @@ def test_an_asset_that_no_file_can_be_is_one_line(tmp_path: Path, href: str) -> 
     path.write_text(json.dumps(item(1, red={"href": href, "type": TIFF})))
     with pytest.raises(ParameterError, match=r"what .*item\.json names has a name that"):
         list_dates([path], None)
-    assert set(files_behind(path)) == {path}
+    assert set(rasters_behind(path)) == {path}
 
 
 def test_an_asset_that_no_file_can_be_costs_no_other(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_an_asset_that_no_file_can_be_costs_no_other(tmp_path: Path) -> None:
     (tmp_path / "a.tif").touch()
     (date,) = list_dates([path], None)
     assert date.raster == tmp_path / "a.tif"
-    assert tmp_path / "a.tif" in files_behind(path)
+    assert tmp_path / "a.tif" in rasters_behind(path)
 
 
 @pytest.mark.parametrize("column", ["file", "mask"])
@@ -255,7 +255,7 @@ def test_a_tables_file_that_no_file_can_be_is_one_line(tmp_path: Path, column: s
     path.write_text(f"file,mask\n{row['file']},{row['mask']}\n")
     with pytest.raises(ParameterError, match=r"what .*dates\.csv names has a name that|NUL"):
         list_dates([path], None)
-    assert path in files_behind(path)
+    assert path in rasters_behind(path)
 
 
 def test_a_date_whose_name_is_no_text_is_one_line(tmp_path: Path) -> None:

@@ -63,17 +63,17 @@ class Surveys:
         Without content that is the same in both arrays; None: none is looked for.
     ground
         Of open ground; None: the images are not two radars', or it alone takes part.
-    phases
-        Of what the reference does not explain of the input, as a whole; None as `rest`.
     fine
         Of smaller chips, which show smaller parts; None: the others are as small.
+    phases
+        Of what the reference does not explain of the input, as a whole; None as `rest`.
     """
 
     whole: Survey | None = None
     rest: Rest | None = None
     ground: Survey | None = None
-    phases: PhaseSurvey | None = None
     fine: Survey | None = None
+    phases: PhaseSurvey | None = None
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -121,7 +121,7 @@ def survey_all(
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
-    return Surveys(whole, rest, ground, phases)
+    return Surveys(whole, rest, ground, phases=phases)
 
 
 def survey_rest(
