@@ -27,7 +27,6 @@ from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     LEAST_OF_REST,
     PEAK_DEVIATIONS,
-    PHASE_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
     deviations_beyond,
@@ -35,7 +34,6 @@ from groundtie.registration.rules.survey import (
     deviations_of_rest,
     has_few_chips,
     height_of_else,
-    peak_of_unexplained,
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
@@ -141,11 +139,6 @@ STATISTICS = (
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
-    Statistic(
-        "unexplained elsewhere: peak",
-        PHASE_DEVIATIONS,
-        lambda evidence: peak_of_unexplained(evidence.surveys)[0],
-    ),
     Statistic(
         "rest elsewhere: second peak",
         REST_PEAK_DEVIATIONS,

@@ -19,7 +19,6 @@ from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.phase_survey import PhaseSurvey
 from groundtie.matching.shared_content import Sensors, SharedContent
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Rest, Surveys
@@ -100,12 +99,11 @@ def evidence(
     survey: Survey | None = None,
     rest: Rest | None = None,
     ground: Survey | None = None,
-    phases: PhaseSurvey | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, ground, phases=phases)
+    surveys = Surveys(survey, rest, ground)
     images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
     return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 
@@ -135,13 +133,6 @@ def survey(
     surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = peak
     surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
     return Survey(GRID, centres, shifts, surfaces)
-
-
-def phases(height: float, right_px: int) -> PhaseSurvey:
-    """Return phases that agree on one shift to the right."""
-    surface = np.zeros((2 * SURVEY_RADIUS_PX + 1,) * 2, np.float32)
-    surface[SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + right_px] = height
-    return PhaseSurvey(surface)
 
 
 # How much is the same: of two grounds beneath something drawn, and of one sensor's views.

@@ -26,7 +26,6 @@ from evidences import (
     in_common,
     leaving,
     left_of_two_sensors,
-    phases,
     points,
     refinement,
     refusing,
@@ -218,10 +217,6 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "pixel-locked content": (
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=1.9, rival=1.0))),
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=2.1, rival=1.0))),
-    ),
-    "unexplained elsewhere": (
-        evidence(GOOD, survey=survey(), phases=phases(19.0, 13)),
-        evidence(GOOD, survey=survey(), phases=phases(17.0, 13)),
     ),
     "rest elsewhere": (
         evidence(

@@ -13,7 +13,6 @@ from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
-from .phase_survey import PhaseSurvey, survey_phases
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
@@ -65,15 +64,12 @@ class Surveys:
         Of open ground; None: the images are not two radars', or it alone takes part.
     fine
         Of smaller chips, which show smaller parts; None: the others are as small.
-    phases
-        Of what the reference does not explain of the input, as a whole; None as `rest`.
     """
 
     whole: Survey | None = None
     rest: Rest | None = None
     ground: Survey | None = None
     fine: Survey | None = None
-    phases: PhaseSurvey | None = None
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -113,15 +109,14 @@ def survey_all(
     """
     model, elsewhere_px = transform.model, accuracy_px[0]
     whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
-    rest = ground = phases = None
+    rest = ground = None
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
-        phases = survey_phases(matcher.pair, transform, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
-    return Surveys(whole, rest, ground, phases=phases)
+    return Surveys(whole, rest, ground)
 
 
 def survey_rest(

@@ -12,7 +12,7 @@ from .stacks import each
 # One image explains the other by a line through their grey values in windows of this side: wide
 # enough that ground which lies elsewhere is hardly explained by chance (1 / 15² of its variance
 # each for slope and mean), and narrow enough for light that changes.
-WINDOW_PX = 15
+_WINDOW_PX = 15
 
 # Windows that vary less than this share of their image explain nothing.
 _LEAST_SHARE = 1e-6
@@ -48,7 +48,7 @@ def unexplained(reference: Patch, input: Patch) -> Patch:
 
 
 def _mean(stack: FloatImage) -> FloatImage:
-    return each(lambda image: cv2.blur(image, (WINDOW_PX, WINDOW_PX)), stack)
+    return each(lambda image: cv2.blur(image, (_WINDOW_PX, _WINDOW_PX)), stack)
 
 
 def _centred(values: FloatImage, valid: Mask) -> FloatImage:

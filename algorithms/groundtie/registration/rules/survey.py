@@ -9,9 +9,8 @@ from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
 from ...matching.parts import LEAST_EXCESS
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
+from ...matching.surveys import LEAST_OF_REST, Rest
 from ...similarity.in_common import MOVED_GROUND_SHARE
-from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
@@ -38,12 +37,6 @@ _LEAST_CHIPS = 0.25
 # 14.3); others from 6.5 on (suites real, calibration of large rural scenes, seeds 440-565, and
 # attacks: controls --seeds 33000-33039, --seeds 72000-72029, once_wrong.txt).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
-
-# Ground that lies elsewhere beneath what is half transparent has a peak of phases: 18.3 to 55 in 5
-# of 31 attacked pairs that no other rule refuses (once_wrong.txt). Right transforms reach 16.8
-# beyond this distance, and 23 at 7 px, by forests and roofs that are displaced (suites one_grid,
-# calibration --seeds 440-443, and attacks, controls --seeds 33000-33039 --sample 120).
-PHASE_DEVIATIONS, _CANOPIES_PX = 18.0, 12.0
 
 
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
@@ -145,22 +138,6 @@ def deviations_of_rest(rest: Rest | None) -> float:
     return deviations_elsewhere(left)
 
 
-def peak_of_unexplained(surveys: Surveys) -> tuple[float, float]:
-    """Return how high phases of what the reference does not explain are elsewhere, and how far off.
-
-    0 where they were not asked.
-    """
-    phases = surveys.phases
-    return (0.0, 0.0) if phases is None else phases.highest_beyond(_CANOPIES_PX)
-
-
-def _unexplained_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    height, off_px = peak_of_unexplained(evidence.surveys)
-    if height < PHASE_DEVIATIONS:
-        return None
-    return f"what the reference does not explain of the input matches {off_px:.0f} px off"
-
-
 def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if deviations_of_rest(evidence.surveys.rest) < REST_PEAK_DEVIATIONS:
         return None
@@ -243,16 +220,6 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites margins and attacks",
         WITHOUT,
         _locked,
-        is_final=True,
-    ),
-    Rule(
-        "unexplained elsewhere",
-        "what the reference does not explain of the input, by lines through grey values in windows "
-        f"of {WINDOW_PX} px, is moved by more than {_CANOPIES_PX:g} px as a whole: phases of the "
-        f"spectra agree on it by {PHASE_DEVIATIONS:g} robust standard deviations",
-        "[Kuglin1975]; suites real and attacks",
-        WITHOUT,
-        _unexplained_elsewhere,
         is_final=True,
     ),
     Rule(
