@@ -11,7 +11,7 @@ import pytest
 
 from groundtie.errors import ParameterError
 from groundtie.registration.user_masks import UserMask
-from groundtie.series.inputs import rasters_behind, list_dates, time_of
+from groundtie.series.inputs import list_dates, rasters_behind, time_of
 from groundtie.stac_items import stated_time
 
 DAY = datetime.datetime(2020, 3, 4)
