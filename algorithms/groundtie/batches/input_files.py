@@ -46,9 +46,12 @@ def names_in(folder: Path) -> dict[str, list[str]]:
 
 
 def files_read(kind: Kind, value: Any) -> Iterator[Path]:
-    """Yield the files, or folders of one raster, that a parameter's checked value stands for."""
-    for name in _names_read(kind, value):
-        yield from (name,) if isinstance(name, Path) else local_files(name)
+    """Return the files, or folders of one raster, that a parameter's checked value stands for."""
+    return chain.from_iterable(map(_files_of, _names_read(kind, value)))
+
+
+def _files_of(name: Path | str) -> Collection[Path]:
+    return (name,) if isinstance(name, Path) else local_files(name)
 
 
 def _names_read(kind: Kind, value: Any) -> Iterator[Path | str]:
@@ -77,10 +80,11 @@ def facts_read(
     own = {os.path.abspath(path) for path in written}
     facts: list[tuple[Any, ...]] = []
     for parameter in tool.parameters:
-        kind, value = parameter.kind, values[parameter.name]
-        names = [name for name in _names_read(kind, value) if isinstance(name, str)]
-        found = list(chain.from_iterable(map(facts_behind, names)))
-        for path in files_read(kind, value):
+        # Once: tables and STAC items are read for them.
+        names = list(_names_read(parameter.kind, values[parameter.name]))
+        of_gdal = (name for name in names if isinstance(name, str))
+        found = list(chain.from_iterable(map(facts_behind, of_gdal)))
+        for path in chain.from_iterable(map(_files_of, names)):
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
             found += map(_facts, chain([path], inside, _beside(path, listed)))
             found += chain.from_iterable(map(facts_behind, sources_of(path)))
