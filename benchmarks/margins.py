@@ -29,9 +29,9 @@ from groundtie.registration.rules.survey import (
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
-    deviations_beyond,
     deviations_elsewhere,
     deviations_of_rest,
+    deviations_of_unexplained,
     has_few_chips,
     height_of_else,
 )
@@ -100,11 +100,6 @@ def _rest_peak(evidence: RegistrationEvidence) -> float:
     return deviations_elsewhere(rest.survey)
 
 
-def _peak_beyond(evidence: RegistrationEvidence) -> float:
-    rest = _without_drawn(evidence)
-    return math.nan if rest is None or rest.beyond is None else deviations_beyond(rest)
-
-
 def _off_drawn(evidence: RegistrationEvidence) -> float:
     """Return how far from what moves drawn content two cameras' images are moved."""
     rest = _without_drawn(evidence)
@@ -135,7 +130,11 @@ STATISTICS = (
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),
     Statistic("pixel-locked content: second peak", REST_PEAK_DEVIATIONS, _rest_peak),
-    Statistic("pixel-locked content: copies", REST_PEAK_DEVIATIONS, _peak_beyond),
+    Statistic(
+        "unexplained elsewhere: second peak",
+        REST_PEAK_DEVIATIONS,
+        lambda evidence: deviations_of_unexplained(evidence.surveys),
+    ),
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),

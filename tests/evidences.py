@@ -99,11 +99,12 @@ def evidence(
     survey: Survey | None = None,
     rest: Rest | None = None,
     ground: Survey | None = None,
+    unexplained: Survey | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, ground)
+    surveys = Surveys(survey, rest, ground, unexplained=unexplained)
     images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
     return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,14 +16,14 @@ from groundtie.matching.locked import EXACT_PX
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
-from groundtie.matching.surveys import Rest, survey_rest
+from groundtie.matching.surveys import Rest, Surveys, survey_all
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (
     LEAST_OF_REST,
     REST_PEAK_DEVIATIONS,
-    deviations_beyond,
     deviations_elsewhere,
+    deviations_of_unexplained,
 )
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -51,15 +52,20 @@ def zoomed_out(values: np.ndarray, factor: int) -> np.ndarray:
     return values.reshape(rows, factor, cols, factor).mean(axis=(1, 3))
 
 
-def rest_of(
+def rest_of(*pair: Any, **more: Any) -> Rest | None:
+    """Return what two arrays leave; parameters as `surveys_of`."""
+    return surveys_of(*pair, **more).rest
+
+
+def surveys_of(
     folder: Path,
     reference: np.ndarray,
     input: np.ndarray,
     context: Context,
     offset: tuple[float, float] = (0.0, 0.0),
     sensors: Sensors = Sensors.CAMERAS,
-) -> Rest | None:
-    """Return what two arrays leave whose rows and columns are an offset apart."""
+) -> Surveys:
+    """Return what chips show of two arrays whose rows and columns are an offset apart."""
     paths = [
         write_raster(
             folder / f"{name}.tif", (2000 + 200 * values).astype(np.uint16), utm_grid(SIDE, SIDE)
@@ -73,24 +79,32 @@ def rest_of(
         transform = Transform(found, pair.grid.crs, other.grid)
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
-        return survey_rest(matcher, transform, places, (ELSEWHERE_PX, EXACT_PX), sensors, context)
+        accuracy_px = ELSEWHERE_PX, EXACT_PX
+        return survey_all(matcher, transform, places, accuracy_px, sensors, None, context)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])
+@pytest.mark.parametrize("moved", [(11, -7), (4, -3)])
 @pytest.mark.parametrize("offset", [(0, 0), (6, -4), (6.4, -3.7)])
 @pytest.mark.slow
 def test_ground_shows_that_a_copy_was_blended_into(
-    share: float, offset: tuple[float, float], tmp_path: Path, context: Context
+    share: float,
+    moved: tuple[int, int],
+    offset: tuple[float, float],
+    tmp_path: Path,
+    context: Context,
 ) -> None:
     reference = noisy(place(), 1)
     copied = ndimage.shift(reference, offset[::-1], mode="mirror")
-    ground = place((11 + round(offset[0]), -7 + round(offset[1])))
+    ground = place((moved[0] + round(offset[0]), moved[1] + round(offset[1])))
     blended = share * copied + (1 - share) * noisy(ground, 2)
-    rest = rest_of(tmp_path, reference, blended, context, offset)
-    assert rest is not None and rest.shared.is_explained and rest.beyond is not None
-    top = np.unravel_index(np.argmax(rest.beyond.mean), rest.beyond.mean.shape)
-    assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx((11, -7), abs=1)
-    assert deviations_beyond(rest) > REST_PEAK_DEVIATIONS
+    surveys = surveys_of(tmp_path, reference, blended, context, offset)
+    assert surveys.rest is not None and surveys.rest.shared.is_explained
+    assert surveys.unexplained is not None
+    mean = surveys.unexplained.mean
+    top = np.unravel_index(np.argmax(mean), mean.shape)
+    assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(moved, abs=1)
+    assert deviations_of_unexplained(surveys) > REST_PEAK_DEVIATIONS
 
 
 @pytest.mark.slow
@@ -99,9 +113,9 @@ def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
 ) -> None:
     reference = noisy(place(), 1)
     for input in (noisy(place(), 2), 0.7 * reference):
-        rest = rest_of(tmp_path, reference, input, context)
-        assert rest is not None and rest.shared.is_explained and rest.beyond is not None
-        assert deviations_beyond(rest) < REST_PEAK_DEVIATIONS
+        surveys = surveys_of(tmp_path, reference, input, context)
+        assert surveys.rest is not None and surveys.rest.shared.is_explained
+        assert deviations_of_unexplained(surveys) < REST_PEAK_DEVIATIONS
 
 
 def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
@@ -109,7 +123,7 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
 ) -> None:
     views = noisy(place(), 1), noisy(place(), 2)
     rest = rest_of(tmp_path, *views, context, sensors=Sensors.DIFFERENT)
-    assert rest is not None and not rest.shared.is_explained and rest.beyond is None
+    assert rest is not None and not rest.shared.is_explained
     assert rest.survey is not None
 
 
@@ -145,10 +159,11 @@ def test_views_with_edges_as_sharp_as_drawn_ones_are_taken_for_such_at_whole_pix
         for by in ((0.0, 0.0), offset[::-1])
     )
     views = noisy(reference, 1, noise), noisy(input, 2, noise)
-    rest = rest_of(tmp_path, *views, context, offset)
+    surveys = surveys_of(tmp_path, *views, context, offset)
+    rest = surveys.rest
     assert rest is not None and rest.shared.sameness.has_sharp_edges and rest.survey is None
-    assert rest.shared.is_drawn == is_drawn and (rest.beyond is None) == is_drawn
-    assert deviations_beyond(rest) < REST_PEAK_DEVIATIONS
+    assert rest.shared.is_drawn == is_drawn
+    assert deviations_of_unexplained(surveys) < REST_PEAK_DEVIATIONS
 
 
 def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) -> None:

@@ -218,6 +218,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=1.9, rival=1.0))),
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=2.1, rival=1.0))),
     ),
+    "unexplained elsewhere": (
+        evidence(GOOD, survey=survey(), unexplained=survey(peak=6.1 / 7)),
+        evidence(GOOD, survey=survey(), unexplained=survey(peak=5.9 / 7)),
+    ),
     "rest elsewhere": (
         evidence(
             GOOD,

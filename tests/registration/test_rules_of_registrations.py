@@ -198,7 +198,7 @@ def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
     """Tall buildings do, whose layover differs."""
     left = survey(3, part=5, height=6.0)
     assert left.parts
-    rest = leaving(left, VIEWS, beyond=survey())
+    rest = leaving(left, VIEWS)
     assert refusing(evidence(GOOD, survey=survey(), rest=rest)) == []
 
 
@@ -262,12 +262,8 @@ def test_a_second_peak_is_other_ground_however_high_the_first_is(
 def test_what_is_left_must_have_no_second_peak(
     peak: float, is_refused: bool, sameness: Sameness
 ) -> None:
-    for rest in (
-        leaving(survey(peak=peak), sameness),
-        leaving(None, VIEWS, beyond=survey(height=1.7, rival=0.0, peak=peak)),
-    ):
-        found = evidence(GOOD, survey=survey(), rest=rest)
-        assert refusing(found) == ["pixel-locked content"] * is_refused
+    found = evidence(GOOD, survey=survey(), rest=leaving(survey(peak=peak), sameness))
+    assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
 @pytest.mark.parametrize(
@@ -282,7 +278,7 @@ def test_what_is_left_must_have_no_second_peak(
         (2.0, 0.0, 2.0, 6.0, False),
     ],
 )
-def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
+def test_what_is_not_explained_must_not_lie_elsewhere(
     height: float, rival: float, peak: float, noise: float, is_refused: bool
 ) -> None:
     """Little may be left that matches anything, unless a second place stands out of its noise."""
@@ -290,8 +286,17 @@ def test_what_is_not_explained_of_copies_must_not_lie_elsewhere(
     drawn = noise * np.random.default_rng(3).normal(size=left.surfaces.shape)
     is_flat = left.surfaces == 0
     left = replace(left, surfaces=np.where(is_flat, drawn, left.surfaces).astype(np.float32))
-    found = evidence(GOOD, survey=survey(), rest=leaving(survey(height=6.0), VIEWS, beyond=left))
-    assert refusing(found) == ["pixel-locked content"] * is_refused
+    found = evidence(GOOD, survey=survey(), unexplained=left)
+    assert refusing(found) == ["unexplained elsewhere"] * is_refused
+
+
+@pytest.mark.parametrize(("chips", "is_refused"), [(12, False), (13, True)])
+def test_of_copies_too_little_is_left_that_is_not_explained(chips: int, is_refused: bool) -> None:
+    """What is left of them in few windows, of 49, is what resampling makes."""
+    left = survey(height=1.0, rival=0.0, peak=6.0)
+    left.surfaces[chips:] = 0
+    found = evidence(GOOD, survey=survey(), unexplained=left)
+    assert refusing(found) == ["unexplained elsewhere"] * is_refused
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,14 @@ def test_nothing_is_left_of_a_copy_in_any_contrast(gain: float, offset: float) -
     assert np.abs(left.values).max() < 0.01 * abs(gain) * reference.std()
 
 
+def test_a_bright_scatterer_elsewhere_changes_nothing() -> None:
+    """Of a copy nothing is left but around it, where rounding is as large as the ground."""
+    reference = 500 + 100 * ground(1)
+    reference[20, 20] = 5e6
+    left = unexplained(stack(reference), stack(2 * reference + 10))
+    assert not left.valid[0][40:].any()
+
+
 def test_other_ground_is_left_that_a_copy_was_blended_into() -> None:
     reference, other = ground(1), ground(2)
     left = unexplained(stack(reference), stack(0.5 * reference + 0.5 * other)).values[0]

@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from ..geometry.judging import TOLERANCE_PX
@@ -21,6 +19,7 @@ from ..rasters.reading import RasterSource
 from ..rasters.windows import Window
 from ..similarity.orientation import SCALES_PX, compress, edge_strength, squared_gradients
 from ..similarity.peak import find_peak
+from ..similarity.phases import Spectra, phase_surface, phases, spectra
 from ..similarity.surface import Surface, normalise
 from .matcher import Places
 
@@ -29,10 +28,6 @@ _WINDOW_PX, _MOST_ALONG = 192, 3
 
 # Smaller windows hold too few edges.
 _LEAST_PX = 32
-
-# Phases are the same to so many pixels, by interpolation: without these frequencies, a shift by
-# half a pixel has one peak, too.
-_BLUR_PX = 0.7
 
 # Edges of two bands have one shift if they correlate by so many robust standard deviations there;
 # one that moves them, if so many times more than they correlate, or do the opposite, unmoved.
@@ -65,7 +60,7 @@ class BandShift:
 class _Band:
     """A band: its spectra, and where it shows the ground against the band `first`."""
 
-    spectra: NDArray[np.complex64]
+    spectra: Spectra
     first: int
     position_px: NDArray[np.float64]
 
@@ -98,31 +93,20 @@ def band_shifts(source: RasterSource) -> Sequence[BandShift]:
     return found
 
 
-def _spectra(source: RasterSource, windows: Sequence[Window], band: int) -> NDArray[np.complex64]:
+def _spectra(source: RasterSource, windows: Sequence[Window], band: int) -> Spectra:
     """Return the spectra of edges in square windows of a band, shape (windows, h, h / 2 + 1)."""
-    spectra = []
-    taper = np.outer(*[np.hanning(windows[0].height)] * 2)
+    found = []
     for window in windows:
         values, valid = source.read(window, band)
         (finest,) = squared_gradients(compress(Patch(values, valid)), valid, SCALES_PX[:1])
         edges = edge_strength(finest, valid)
-        mean = edges.values[edges.valid].mean() if edges.valid.any() else np.float32(0)
-        centred = np.where(edges.valid, edges.values - mean, 0) * taper
-        spectra.append(scipy.fft.rfft2(centred.astype(np.float32)))
-    return np.array(spectra)
+        found.append(spectra(Patch(edges.values[None], edges.valid[None]))[0])
+    return np.array(found)
 
 
-def _shift_px(
-    one: NDArray[np.complex64], other: NDArray[np.complex64], side: int
-) -> NDArray[np.float64] | None:
+def _shift_px(one: Spectra, other: Spectra, side: int) -> NDArray[np.float64] | None:
     """Return how far bands are apart, (x, y), by spectra of windows of a side; None: unclear."""
-    cross = one.conj() * other
-    size = np.abs(cross)
-    phases = np.divide(cross, size, out=np.zeros_like(cross), where=size > 0).sum(axis=0)
-    over_shifts = np.fft.fftshift(scipy.fft.irfft2(phases, (side, side)))
-    # So that no shift is in the middle.
-    whole = over_shifts[1 - side % 2 :, 1 - side % 2 :]
-    surface = normalise(np.asarray(cv2.GaussianBlur(whole, (0, 0), _BLUR_PX), np.float32))
+    surface = normalise(phase_surface(phases(one, other).sum(axis=0), side))
     peak = find_peak(surface)
     least = _LEAST_HEIGHT
     if np.hypot(*peak.shift_px) > TOLERANCE_PX:

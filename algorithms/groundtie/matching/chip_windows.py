@@ -22,6 +22,10 @@ from ..rasters.patch import Patch
 from .matcher import MaskOf, Places
 
 R = TypeVar("R")
+
+# Returns what of the input is looked at, given the reference and the input.
+LeftOf = Callable[[Patch, Patch], Patch]
+
 _Numbers = NDArray[np.intp]
 
 # The upper left corner of a piece of a grid, and both images there.
@@ -114,12 +118,15 @@ class ChipWindows:
     hidden
         Returns for a piece of a grid which pixels of the reference must not be seen; None: all
         may be.
+    left_of
+        What of the input is looked at; None: all is.
     """
 
     images: Resampled
     places: Places
     reach_px: int
     hidden: MaskOf | None
+    left_of: LeftOf | None = None
 
     def map(
         self,
@@ -200,7 +207,9 @@ class ChipWindows:
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
-        return corner, self.images.read(piece, self.hidden)
+        reference, input = self.images.read(piece, self.hidden)
+        left = input if self.left_of is None else self.left_of(reference, input)
+        return corner, (reference, left)
 
     def _cut(self, piece: _Piece, stack: _Numbers) -> tuple[Patch, Patch]:
         """Return the stacks of chips' reference and input windows in a piece."""

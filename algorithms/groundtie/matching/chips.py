@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,9 +31,6 @@ from .matcher import ChipSurfaces, MaskOf, Places
 
 _log = logging.getLogger(__name__)
 
-# Returns stacks of the input's windows, given stacks of the reference's and the input's.
-LeftOf = Callable[[Patch, Patch], Patch]
-
 # Chips with less valid area than this in either image are not matched. A mask leaves what was
 # chosen to be matched: a little of it may be enough.
 _LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
@@ -62,15 +58,12 @@ class ChipMatcher:
     least_valid
         Chips with less valid area than this share in either image are not matched; None: as images
         with or without a mask.
-    left_of
-        Returns what of the input's windows is matched, given both images'; None: all is.
     """
 
     pair: ImagePair
     settings: SimilaritySettings
     held_out: MaskOf | None = None
     least_valid: float | None = None
-    left_of: LeftOf | None = None
 
     def seeing_all(self) -> ChipMatcher:
         """Return this matcher for check chips, which may see what is held out of the fit."""
@@ -154,8 +147,6 @@ class ChipMatcher:
             return similarity_surface(inner, search, radius_px, self.settings)
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
-            if self.left_of is not None:
-                input = self.left_of(reference, input)
             pixels = places.chip_px**2
             of_reference = describe(reference, pixels, self.settings, context.memo)
             of_input = describe(input, pixels, self.settings)

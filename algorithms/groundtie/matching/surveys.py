@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from ..context import Context
 from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
-from ..similarity.unexplained import unexplained
 from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
+from .phase_survey import CANOPIES_PX, survey_unexplained
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
@@ -35,9 +35,6 @@ class Rest:
     survey
         What they show; None: it is not asked, as of hardly any such content, of what is drawn, and
         of copies and views that hide nothing.
-    beyond
-        What they show beyond what the reference explains of the input, where it is explained;
-        None elsewhere.
     without_edges
         What they show without the surroundings of edges that coincide, where no such content is
         evident and hardly anything is left of other images than two radars'; None elsewhere.
@@ -46,7 +43,6 @@ class Rest:
     shared: SharedContent
     chips: int
     survey: Survey | None = None
-    beyond: Survey | None = None
     without_edges: Survey | None = None
 
 
@@ -64,12 +60,15 @@ class Surveys:
         Of open ground; None: the images are not two radars', or it alone takes part.
     fine
         Of smaller chips, which show smaller parts; None: the others are as small.
+    unexplained
+        Of what the reference does not explain of the input; None: as `rest`.
     """
 
     whole: Survey | None = None
     rest: Rest | None = None
     ground: Survey | None = None
     fine: Survey | None = None
+    unexplained: Survey | None = None
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -109,14 +108,17 @@ def survey_all(
     """
     model, elsewhere_px = transform.model, accuracy_px[0]
     whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
-    rest = ground = None
+    rest = ground = unexplained = None
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
+        is_explained = rest is not None and rest.shared.is_explained
+        least_px = elsewhere_px if is_explained else max(elsewhere_px, CANOPIES_PX)
+        unexplained = survey_unexplained(matcher.pair, transform, least_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
-    return Surveys(whole, rest, ground)
+    return Surveys(whole, rest, ground, unexplained=unexplained)
 
 
 def survey_rest(
@@ -161,11 +163,5 @@ def survey_rest(
         return Rest(shared, chips, left, without_edges=without_edges)
     if shared.is_drawn:
         return Rest(shared, chips)
-    seen = beyond = None
-    if not shared.is_explained or shared.may_hide_ground:
-        seen = left_without(locked)
-    if shared.is_explained:
-        # A copy may be blended into other ground, of which the same windows are no part.
-        other = replace(fused, left_of=unexplained)
-        beyond = survey_model(other, transform.model, places, elsewhere_px, context)
-    return Rest(shared, chips, seen, beyond)
+    is_asked = not shared.is_explained or shared.may_hide_ground
+    return Rest(shared, chips, left_without(locked) if is_asked else None)

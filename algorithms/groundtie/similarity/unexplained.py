@@ -12,9 +12,9 @@ from .stacks import each
 # One image explains the other by a line through their grey values in windows of this side: wide
 # enough that ground which lies elsewhere is hardly explained by chance (1 / 15² of its variance
 # each for slope and mean), and narrow enough for light that changes.
-_WINDOW_PX = 15
+WINDOW_PX = 15
 
-# Windows that vary less than this share of their image explain nothing.
+# A variance of less than this share of the mean square is rounding, and explains nothing.
 _LEAST_SHARE = 1e-6
 
 # What is left of less than this share of the variance is rounding or noise, and shows no ground.
@@ -30,28 +30,31 @@ def unexplained(reference: Patch, input: Patch) -> Patch:
         Stacks of windows, shape (n, h, w).
     """
     valid = reference.valid & input.valid
-    known = np.maximum(_mean(valid.astype(np.float32)), np.finfo(np.float32).eps)
+    known = 1 if valid.all() else np.maximum(_blurred(valid), np.finfo(np.float32).eps)
     one, other = (_centred(patch.values, valid) for patch in (input, reference))
 
     def mean(of: FloatImage) -> FloatImage:
-        return np.asarray(_mean(of) / known, np.float32)
+        return np.asarray(_blurred(of) / known, np.float32)
 
-    means = mean(one), mean(other)
-    variance = np.maximum(mean(other * other) - means[1] ** 2, 0)
+    means, square = (mean(one), mean(other)), mean(other * other)
+    least = _LEAST_SHARE * square + np.finfo(np.float32).tiny
+    variance = np.maximum(square - means[1] ** 2, least)
     common = mean(one * other) - means[0] * means[1]
-    least = _LEAST_SHARE * float(variance.max(initial=0.0)) + np.finfo(np.float32).tiny
-    left = one - means[0] - common / np.maximum(variance, least) * (other - means[1])
-    left = np.where(valid, left, 0).astype(np.float32)
+    left = one - means[0] - common / variance * (other - means[1])
+    left = np.where(valid, left, 0)
     own = np.maximum(mean(one * one) - means[0] ** 2, 0)
     shown = valid & (mean(left * left) > _LEAST_LEFT * own)
     return Patch(np.where(shown, left, 0), shown)
 
 
-def _mean(stack: FloatImage) -> FloatImage:
-    return each(lambda image: cv2.blur(image, (_WINDOW_PX, _WINDOW_PX)), stack)
+def _blurred(stack: FloatImage | Mask) -> FloatImage:
+    size = WINDOW_PX, WINDOW_PX
+    return each(lambda image: cv2.blur(image, size), stack.astype(np.float32, copy=False))
 
 
 def _centred(values: FloatImage, valid: Mask) -> FloatImage:
     """Return values about a middle: of squares of large ones, small differences lose digits."""
-    middle = np.median(values[valid]) if valid.any() else 0.0
-    return np.where(valid, values - middle, 0).astype(np.float32)
+    some = (..., slice(None, None, WINDOW_PX), slice(None, None, WINDOW_PX))
+    sample = values[some][valid[some]]
+    middle = np.median(sample) if sample.size else 0.0
+    return np.where(valid, values - np.float32(middle), 0)

@@ -6,11 +6,13 @@ import math
 
 from ...geometry.judging import RIVAL_HEIGHT
 from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
-from ...matching.parts import LEAST_EXCESS
+from ...matching.parts import ELSEWHERE_PX, LEAST_EXCESS
+from ...matching.phase_survey import CANOPIES_PX
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ...matching.surveys import LEAST_OF_REST, Rest
+from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
 from ...similarity.in_common import MOVED_GROUND_SHARE
+from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
@@ -91,15 +93,6 @@ def has_few_chips(survey: Survey, chips: int) -> bool:
     return survey.comparable < _LEAST_CHIPS * chips
 
 
-def deviations_beyond(rest: Rest) -> float:
-    """Return how far what a copy's reference does not explain stands out elsewhere.
-
-    0 where too little is left.
-    """
-    left = rest.beyond
-    return 0.0 if left is None or has_few_chips(left, rest.chips) else deviations_elsewhere(left)
-
-
 def _confirms(left: Survey, rest: Rest) -> bool:
     if has_few_chips(left, rest.chips):
         return rest.shared.is_explained
@@ -114,8 +107,6 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         return None
     if rest.shared.is_drawn:
         return "both images show the same drawn edges, sharper than ground's or beside one another"
-    if deviations_beyond(rest) >= REST_PEAK_DEVIATIONS:
-        return "what the reference does not explain of the input matches elsewhere"
     left = rest.survey
     if left is None or _confirms(left, rest):
         return None
@@ -123,6 +114,23 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
         "without what both images have the same, pixel by pixel, only "
         f"{left.confirming} of {len(left.centres)} chips match where the transform has them"
     )
+
+
+def deviations_of_unexplained(surveys: Surveys) -> float:
+    """Return how far what the reference does not explain of the input stands out elsewhere.
+
+    0 where too little is left, as of copies.
+    """
+    left = surveys.unexplained
+    if left is None or has_few_chips(left, len(left.centres)):
+        return 0.0
+    return deviations_elsewhere(left)
+
+
+def _unexplained_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    if deviations_of_unexplained(evidence.surveys) < REST_PEAK_DEVIATIONS:
+        return None
+    return "what the reference does not explain of the input matches elsewhere"
 
 
 def deviations_of_rest(rest: Rest | None) -> float:
@@ -213,13 +221,24 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "quarter of the chips is left, a second place matches about as well or is a peak of "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
         f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, a quarter is left "
-        "that is below that or has such a place, or what the reference does not explain of it has "
-        "one; but cameras' images that are displaced as ground is, by more than "
+        "that is below that or has such a place; but cameras' images that are displaced as ground "
+        "is, by more than "
         f"{NOMINAL_PX:g} px on the map and by no whole pixels to {WHOLE_TIMES_EXACT * EXACT_PX:g} "
         f"px, may have sharp edges where {MOVED_GROUND_SHARE:g} of what is left varies alike",
         "suites margins and attacks",
         WITHOUT,
         _locked,
+        is_final=True,
+    ),
+    Rule(
+        "unexplained elsewhere",
+        "what the reference does not explain of the input, by lines through grey values in windows "
+        f"of {WINDOW_PX} px, correlates in phase with the reference at a second place: more than "
+        f"{CANOPIES_PX:g} px off, of copies and one camera's views {ELSEWHERE_PX:g} px, by a peak "
+        f"of {REST_PEAK_DEVIATIONS:g} robust standard deviations",
+        "[Kuglin1975]; suites one_grid and attacks",
+        WITHOUT,
+        _unexplained_elsewhere,
         is_final=True,
     ),
     Rule(
