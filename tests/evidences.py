@@ -115,10 +115,11 @@ def survey(
     height: float = 8.0,
     rival: float = 2.0,
     peak: float = 0.0,
+    peak_px: int = 9,
 ) -> Survey:
     """Return a survey of 7 × 7 chips, of which some confirm and some rows' first ones lie off.
 
-    The others have a rival beside where they confirm, which is no peak, and a peak elsewhere.
+    The others have a rival beside where they confirm, which is no peak, and a peak so far off.
     """
     centres = np.stack(np.meshgrid(*[np.arange(7) * 70 + 40] * 2), -1).reshape(-1, 2)
     random = np.random.default_rng(7)
@@ -131,7 +132,7 @@ def survey(
     beside = SURVEY_RADIUS_PX + int(ELSEWHERE_PX)
     surfaces[part:, beside, SURVEY_RADIUS_PX] = rival + 0.1
     surfaces[part:, beside + 1, SURVEY_RADIUS_PX] = rival
-    surfaces[part:, SURVEY_RADIUS_PX + 9, SURVEY_RADIUS_PX] = peak
+    surfaces[part:, SURVEY_RADIUS_PX + peak_px, SURVEY_RADIUS_PX] = peak
     surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = height
     return Survey(GRID, centres, shifts, surfaces)
 

@@ -21,6 +21,7 @@ from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (
     LEAST_OF_REST,
+    PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     deviations_elsewhere,
     deviations_of_unexplained,
@@ -104,7 +105,7 @@ def test_ground_shows_that_a_copy_was_blended_into(
     mean = surveys.unexplained.mean
     top = np.unravel_index(np.argmax(mean), mean.shape)
     assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(moved, abs=1)
-    assert deviations_of_unexplained(surveys) > REST_PEAK_DEVIATIONS
+    assert deviations_of_unexplained(surveys, ELSEWHERE_PX) > PEAK_DEVIATIONS
 
 
 @pytest.mark.slow
@@ -115,7 +116,7 @@ def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
     for input in (noisy(place(), 2), 0.7 * reference):
         surveys = surveys_of(tmp_path, reference, input, context)
         assert surveys.rest is not None and surveys.rest.shared.is_explained
-        assert deviations_of_unexplained(surveys) < REST_PEAK_DEVIATIONS
+        assert deviations_of_unexplained(surveys, ELSEWHERE_PX) < REST_PEAK_DEVIATIONS
 
 
 def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
@@ -163,7 +164,7 @@ def test_views_with_edges_as_sharp_as_drawn_ones_are_taken_for_such_at_whole_pix
     rest = surveys.rest
     assert rest is not None and rest.shared.sameness.has_sharp_edges and rest.survey is None
     assert rest.shared.is_drawn == is_drawn
-    assert deviations_of_unexplained(surveys) < REST_PEAK_DEVIATIONS
+    assert deviations_of_unexplained(surveys, ELSEWHERE_PX) < REST_PEAK_DEVIATIONS
 
 
 def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) -> None:

@@ -219,8 +219,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), rest=leaving(survey(height=2.1, rival=1.0))),
     ),
     "unexplained elsewhere": (
-        evidence(GOOD, survey=survey(), unexplained=survey(peak=6.1 / 7)),
-        evidence(GOOD, survey=survey(), unexplained=survey(peak=5.9 / 7)),
+        evidence(GOOD, survey=survey(), unexplained=survey(peak=6.1 / 7, peak_px=13)),
+        evidence(GOOD, survey=survey(), unexplained=survey(peak=5.9 / 7, peak_px=13)),
     ),
     "rest elsewhere": (
         evidence(

@@ -26,9 +26,6 @@ from .survey import SURVEY_RADIUS_PX, Survey
 _CHIP_PX, _REACH_PX, _MOST_ALONG = 64, 64, 7
 _SIDE_PX = _CHIP_PX + 2 * _REACH_PX
 
-# So far off lie roofs and canopies that layover and parallax displace.
-CANOPIES_PX = 9.0
-
 
 def survey_unexplained(
     pair: ImagePair, transform: Transform, elsewhere_px: float, context: Context

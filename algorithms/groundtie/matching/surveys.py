@@ -12,7 +12,7 @@ from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
-from .phase_survey import CANOPIES_PX, survey_unexplained
+from .phase_survey import survey_unexplained
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
@@ -112,9 +112,7 @@ def survey_all(
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
-        is_explained = rest is not None and rest.shared.is_explained
-        least_px = elsewhere_px if is_explained else max(elsewhere_px, CANOPIES_PX)
-        unexplained = survey_unexplained(matcher.pair, transform, least_px, context.quiet())
+        unexplained = survey_unexplained(matcher.pair, transform, elsewhere_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
