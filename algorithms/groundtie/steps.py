@@ -95,7 +95,7 @@ def similarity_surface(
         least = 2 * (radius_px + BORDER_PX) + 1
         raise ParameterError(f"windows must have {least} pixels a side for a radius of {radius_px}")
     compared = windows[0].inner(radius_px + BORDER_PX), windows[1].inner(BORDER_PX)
-    if any(map(_is_constant, compared)):
+    if any(window.is_flat for window in compared):
         # Its mutual information is nothing but rounding, of which a peak would be made.
         return np.zeros((2 * radius_px + 1,) * 2, np.float32)
     settings = SimilaritySettings(similarity)
@@ -263,12 +263,6 @@ def _stages(
         open_pair(reference, input, spec, running.quiet()) as opened,
     ):
         yield Stages.of(opened.images, mask_pair(opened, spec, running.quiet()), spec), running
-
-
-def _is_constant(window: Patch) -> bool:
-    """Return whether the valid pixels of a window hold one value, if any."""
-    known = window.values[window.valid]
-    return bool((known == known[:1]).all())
 
 
 def _patch(image: ArrayLike) -> Patch:
