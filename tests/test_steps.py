@@ -92,6 +92,27 @@ class TestSurface:
             steps.similarity_surface(*(np.ones(shape) for shape in shapes), 10)
 
 
+class TestPeak:
+    def test_a_surface_need_not_be_square(self) -> None:
+        """As a user cuts it, or has it from elsewhere, in lists."""
+        y, x = np.mgrid[-10:11, -20:21]
+        surface = 9 - 0.4 * (x - 3.2) ** 2 - 0.3 * (y - 2.1) ** 2
+        for given in (surface, surface.tolist()):
+            assert steps.find_peak(given).shift_px == pytest.approx((3.2, 2.1))
+
+    @pytest.mark.parametrize("shape", [(20, 20), (21, 20), (5,), (3, 21, 21), (0, 0), ()])
+    def test_a_surface_without_a_middle(self, shape: tuple[int, ...]) -> None:
+        with pytest.raises(ParameterError, match="must have odd numbers of rows and columns, not"):
+            steps.find_peak(np.zeros(shape))
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf, 1j, "a"])
+    def test_what_is_no_finite_number(self, value: Any) -> None:
+        surface = np.zeros((21, 21)).astype(np.result_type(type(value)))
+        surface[4, 5] = value
+        with pytest.raises(ParameterError, match="must hold finite numbers: 0 where nothing is"):
+            steps.find_peak(surface)
+
+
 class TestFit:
     def made(self, kind: str, outliers: int, unit: float = 1.0) -> tuple[Any, Any, Any]:
         rng = np.random.default_rng(1)

@@ -35,7 +35,8 @@ from .registration.specification import COREGISTER, Specification
 from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
 from .similarity.description import BORDER_PX
-from .similarity.peak import Peak, find_peak
+from .similarity.peak import Peak
+from .similarity.peak import find_peak as peak_of
 from .similarity.surface import SIMILARITIES, SimilaritySettings, Surface, describe
 from .similarity.surface import similarity_surface as surface_of
 
@@ -101,6 +102,30 @@ def similarity_surface(
     settings = SimilaritySettings(similarity)
     template, search = (describe(w, chip_pixels[0] * chip_pixels[1], settings) for w in windows)
     return surface_of(template.inner(radius_px), search, radius_px, settings)
+
+
+def find_peak(surface: ArrayLike) -> Peak:
+    """Return the highest peak of a surface: its shift, covariance and height.
+
+    Parameters
+    ----------
+    surface
+        As of `similarity_surface`, shape (2 r + 1, 2 q + 1), shift 0 in its middle; 0, the
+        background's value, where nothing is known.
+
+    Raises
+    ------
+    ParameterError
+        It has no middle, or holds what is no finite number.
+    """
+    values = np.asarray(surface)
+    if values.ndim != 2 or 0 in np.mod(values.shape, 2):
+        raise ParameterError(
+            f"a surface must have odd numbers of rows and columns, not {values.shape}"
+        )
+    if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+        raise ParameterError("a surface must hold finite numbers: 0 where nothing is known")
+    return peak_of(values)
 
 
 def match_chips(
