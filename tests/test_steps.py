@@ -135,6 +135,38 @@ class TestFit:
         assert np.median(errors) < 0.15 * unit
         np.testing.assert_allclose(fit.model.inverse(fit.model(xy)), xy, atol=1e-4 * unit)
 
+    @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2", "tps"])
+    @pytest.mark.parametrize("turn", [15, 90, 180])
+    def test_any_rotation(self, kind: str, turn: int) -> None:
+        """Two fifths are outliers, as far off as any place of the image."""
+        rng = np.random.default_rng(turn)
+        xy = rng.uniform(0, 300, (100, 2))
+        cos, sin = np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))
+        truth = xy @ np.array([[cos, sin], [-sin, cos]]) + SHIFT
+        found = truth + rng.normal(0, 0.1, xy.shape)
+        found[:40] = rng.permutation(found[:40])
+        fit = steps.fit_model(kind, xy, found, radius_px=300)
+        assert fit.inliers[40:].all() and fit.inliers.sum() < 64
+        np.testing.assert_allclose(fit.model(xy), truth, atol=0.5)
+        np.testing.assert_allclose(fit.model.inverse(truth), xy, atol=0.5)
+
+    @pytest.mark.parametrize("scale", [0.3, 1.25, 4.0])
+    def test_any_scale(self, scale: float) -> None:
+        xy = self.made("affine", 0)[0]
+        fit = steps.fit_model("similarity", xy, scale * xy)
+        assert fit.inliers.all()
+        np.testing.assert_allclose(fit.model(xy), scale * xy, atol=1e-6)
+
+    @pytest.mark.parametrize("noise", [1e-3, 0.05, 1.0, 2.4])
+    @pytest.mark.parametrize("unit", [1.0, 10.0])
+    def test_sigma_is_that_of_the_residuals(self, noise: float, unit: float) -> None:
+        rng = np.random.default_rng(2)
+        xy = rng.uniform(0, 1000, (400, 2))
+        found = xy + SHIFT + rng.normal(0, noise, xy.shape)
+        fit = steps.fit_model("translation", unit * xy, unit * found, pixel_size=unit)
+        # Of 800 numbers it is known to 1 / √1600, 2.5 %.
+        assert fit.sigma == pytest.approx(noise * unit, rel=0.08)
+
     def test_too_few_points(self) -> None:
         with pytest.raises(TooFewPointsError, match="at least 3 points; there are 2"):
             steps.fit_model("translation", np.zeros((2, 2)), np.zeros((2, 2)))

@@ -224,7 +224,8 @@ def fit_model(
         )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
-    start = find_consensus(px, nominal_px, tolerance_px, kind, seed)
+    # A person's own points may be of images of any rotation and scale.
+    start = find_consensus(px, nominal_px, tolerance_px, kind, seed, np.inf)
     model, mixture = fit_robustly(
         kind,
         px,
@@ -233,7 +234,10 @@ def fit_model(
         start,
         (2 * radius_px + 1) ** 2,
     )
-    return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, mixture.sigma * pixel_size)
+    residuals = (nominal_px - model(px))[mixture.inliers]
+    # The mixture's own is kept within what matches have.
+    sigma = float(np.sqrt((residuals**2).mean())) * pixel_size
+    return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, sigma)
 
 
 def judge(
