@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,12 @@ from textured_pairs import texture
 from groundtie import Raster, steps
 from groundtie.errors import NoOverlapError, ParameterError, TooFewPointsError
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import shift_model
+from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.specification import COREGISTER
 from groundtie.similarity.surface import SIMILARITIES
 
 SIZE = 384
@@ -33,6 +37,19 @@ def pair(seed: int = 0, noise: float = 0.2) -> tuple[Any, Any]:
     noisy = np.random.default_rng(seed + 9).normal(0, noise, (SIZE, SIZE))
     reference = scene[MARGIN : MARGIN + SIZE, MARGIN : MARGIN + SIZE]
     return reference, -scene[top : top + SIZE, left : left + SIZE] + noisy
+
+
+def no_points() -> TiePoints:
+    none = np.zeros((0, 2))
+    return TiePoints(
+        reference_xy=none,
+        input_px=none,
+        score=none[:, 0],
+        covariance_px2=np.zeros((0, 2, 2)),
+        forward_backward_error_px=none[:, 0],
+        is_check=np.zeros(0, bool),
+        state=np.zeros(0, "U9"),
+    )
 
 
 class TestSurface:
@@ -175,12 +192,104 @@ class TestFit:
         with pytest.raises(ParameterError, match=r"one of translation, .*, not 'rubb'"):
             steps.fit_model("rubb", np.zeros((9, 2)), np.zeros((9, 2)))
 
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"pixel_size": 0}, "pixel_size must be above 0, not 0"),
+            ({"pixel_size": -1}, "pixel_size must be at least 0, not -1"),
+            ({"pixel_size": "a"}, "pixel_size must be a number, not 'a'"),
+            ({"tolerance_px": 0}, "tolerance_px must be above 0, not 0"),
+            ({"tolerance_px": np.nan}, "tolerance_px must be a finite number, not nan"),
+            ({"radius_px": -0.5}, "radius_px must be at least 0 px, not -0.5"),
+            ({"radius_px": np.inf}, "radius_px must be a finite number, not inf"),
+            ({"seed": -1}, "seed must be at least 0, not -1"),
+            ({"seed": 1.5}, "seed must be a whole number, not 1.5"),
+        ],
+    )
+    def test_what_is_out_of_range(self, asked: dict[str, Any], message: str) -> None:
+        xy, _, found = self.made("translation", 0)
+        with pytest.raises(ParameterError, match=message):
+            steps.fit_model("translation", xy, found, **asked)
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf])
+    def test_a_position_that_is_none(self, value: float) -> None:
+        xy, _, found = self.made("affine", 0)
+        found[7] = value
+        with pytest.raises(ParameterError, match=r"positions must be finite numbers; 1 of 60 are"):
+            steps.fit_model("affine", xy, found)
+
+    def test_positions_that_are_no_numbers(self) -> None:
+        with pytest.raises(ParameterError, match="positions must be numbers: could not convert"):
+            steps.fit_model("affine", "abc", [["a"]])
+
     def test_positions_that_are_no_pairs(self) -> None:
         xy, _, found = self.made("affine", 0)
         with pytest.raises(ParameterError, match=r"the shape \(\.\.\., 2\), not \(2, 60\)"):
             steps.fit_model("affine", xy.T, found.T)
         with pytest.raises(ParameterError, match=r"60 positions .*, but 59 in the input"):
             steps.fit_model("affine", xy, found[1:])
+
+
+class TestWhatCannotBeMatchedOrJudged:
+    """One line, before anything is opened."""
+
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"radius_px": 0}, "radius_px must be at least 1 px, not 0"),
+            ({"radius_px": 2.5}, "radius_px must be a whole number, not 2.5"),
+            ({"radius_px": "a"}, "radius_px must be a number, not 'a'"),
+            ({"model": "x"}, "model must be a Model, not a str"),
+            ({"spec": "x"}, "spec must be a Specification, not a str"),
+            ({"context": "x"}, "context must be a Context, not a str"),
+        ],
+    )
+    def test_match_chips(self, asked: dict[str, Any], message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            steps.match_chips("reference.tif", "input.tif", **asked)
+
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"model": None}, "model must be a Model, not a NoneType"),
+            ({"model": steps.Fit(shift_model(0, 0), np.ones(3, bool), 1.0)}, "not a Fit"),
+            ({"points": [[0, 0]]}, "points must be a TiePoints, not a list"),
+            ({"spec": "x"}, "spec must be a Specification, not a str"),
+        ],
+    )
+    def test_judge(self, asked: dict[str, Any], message: str) -> None:
+        given = {"model": shift_model(0, 0), "points": no_points()} | asked
+        with pytest.raises(ParameterError, match=message):
+            steps.judge("reference.tif", "input.tif", **given)
+
+    def test_a_model_of_no_points_is_refused(self) -> None:
+        verdict = steps.judge(*pair(), shift_model(0, 0), no_points())
+        assert not verdict.accepted
+        assert verdict.rule == "too few points"
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"matcher": "foo"}, "matcher must be one of chips, keypoints, guided-chips, not 'foo'"),
+        ({"similarity": "foo"}, "similarity must be one of fused, nmi, .*, not 'foo'"),
+        ({"refinement": None}, "refinement must be one of fused, nmi, .*, not None"),
+        ({"model": "foo"}, "model must be one of auto, translation, .*, not 'foo'"),
+        ({"candidates": ("affine", "foo")}, "candidates must be one of translation, .*, not 'foo'"),
+        ({"radar": "foo"}, "radar must be one of auto, reference, input, both, neither, not"),
+        ({"max_error_px": float("nan")}, "max_error_px must be a finite number, not nan"),
+        ({"max_error_px": 0}, "max_error_px must be 0.1 to 100 px, not 0"),
+        ({"search_radius_m": -5}, "search_radius_m must be at least 0 m, not -5"),
+        ({"rotation_deg": 200}, "rotation_deg must be 0 to 180 °, not 200"),
+        ({"scale": 0.5}, "scale must be at least 1, not 0.5"),
+        ({"matching_pixel_size_m": -1}, "matching_pixel_size_m must be at least 1e-06 m, not -1"),
+        ({"tries": 0}, "tries must be at least 1, not 0"),
+        ({"tries": "a"}, "tries must be a number, not 'a'"),
+    ],
+)
+def test_what_cannot_be_specified(asked: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        replace(COREGISTER, **asked)
 
 
 class TestFromImagesToVerdict:

@@ -55,6 +55,12 @@ __all__ = [
 _USUAL_SIGMA_PX = 0.25
 
 _RADIUS = Number(help="Largest shift.", unit="px", minimum=0, integer=True)
+# With none, a surface has no peak inside.
+_MATCH_RADIUS = replace(_RADIUS, minimum=1)
+_REACH = replace(_RADIUS, integer=False)
+_SIZE = Number(help="Size, above 0.", minimum=0)
+_SEED = Number(help="Seed of random numbers.", minimum=0, integer=True)
+_KIND = Choice(help="Kind of model.", choices=KINDS)
 _SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
 
 
@@ -152,8 +158,15 @@ def match_chips(
         How chips are laid out, masked and compared.
     context
         Threads and progress; None: a thread for each processor.
+
+    Raises
+    ------
+    ParameterError
+        The radius is no whole number from 1 on, or something is of another type.
     """
     model = shift_model(0.0, 0.0) if model is None else model
+    _require("model", model, Model)
+    radius_px = int(_MATCH_RADIUS.check("radius_px", radius_px))
     with _stages(reference, input, spec, context) as (stages, running):
         places = stages.matcher.fit_places(stages.held_out.layout)
         surfaces = stages.matcher.match(model, places, radius_px, running)
@@ -211,16 +224,25 @@ def fit_model(
     Raises
     ------
     ParameterError
-        There is no such kind of model, or the positions are no pairs.
+        There is no such kind of model, the positions are no pairs of finite numbers, or a number is
+        out of its range.
     TooFewPointsError
         Too few pairs agree with a model of this kind.
     """
-    if kind not in KINDS:
-        raise ParameterError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    kind = _KIND.check("kind", kind)
+    pixel_size = _above_0("pixel_size", pixel_size)
+    tolerance_px = _above_0("tolerance_px", tolerance_px)
+    radius_px = _REACH.check("radius_px", radius_px)
+    seed = int(_SEED.check("seed", seed))
     px, nominal_px = (as_positions(p).reshape(-1, 2) / pixel_size for p in (xy, nominal_xy))
     if len(px) != len(nominal_px):
         raise ParameterError(
             f"{len(px)} positions in the reference, but {len(nominal_px)} in the input"
+        )
+    finite = np.isfinite(np.hstack([px, nominal_px])).all(axis=1)
+    if not finite.all():
+        raise ParameterError(
+            f"positions must be finite numbers; {(~finite).sum()} of {len(px)} are not"
         )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
@@ -265,7 +287,14 @@ def judge(
         How the images are inspected, masked and compared, and the largest error that is accepted.
     context
         Threads and progress; None: a thread for each processor.
+
+    Raises
+    ------
+    ParameterError
+        Something is of another type.
     """
+    _require("model", model, Model)
+    _require("points", points, TiePoints)
     with _stages(reference, input, spec, context) as (stages, running):
         pair = stages.masked.pair
         transform = pair.transform(model)
@@ -286,12 +315,27 @@ def _stages(
     reference: Any, input: Any, spec: Specification, context: Context | None
 ) -> Iterator[tuple[Stages, Context]]:
     """Open a pair and put the stages of its registration together."""
+    _require("spec", spec, Specification)
+    if context is not None:
+        _require("context", context, Context)
     with (
         threads() if context is None else nullcontext(context) as running,
         bounded_cache(),
         open_pair(reference, input, spec, running.quiet()) as opened,
     ):
         yield Stages.of(opened.images, mask_pair(opened, spec, running.quiet()), spec), running
+
+
+def _require(name: str, value: Any, kind: type) -> None:
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name} must be a {kind.__name__}, not a {type(value).__name__}")
+
+
+def _above_0(name: str, value: Any) -> float:
+    number = _SIZE.check(name, value)
+    if number == 0:
+        raise ParameterError(f"{name} must be above 0, not 0")
+    return number
 
 
 def _patch(image: ArrayLike) -> Patch:

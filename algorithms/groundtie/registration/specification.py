@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from ..geometry.judging import USUAL_MAX_ERROR_PX
+from ..geometry.models import KINDS, PARAMETERS
 from ..geometry.views import RADAR, View
-from ..kinds import AUTO
+from ..kinds import AUTO, Choice, Distance, Kind, Number
 from ..masks.used import INPUT, REFERENCE
 from ..matching.alignment import MODEL_CANDIDATES
 from ..raster_names import file_name
 from ..rasters.rendered import Light
+from ..similarity.surface import SIMILARITIES
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
 # all over around a model of keypoints.
@@ -76,6 +78,24 @@ class StatedSurface:
         return (REFERENCE if is_radar[0] else INPUT) if any(is_radar) else NEITHER
 
 
+# What values may be: tools have the same words and ranges.
+_SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
+_KINDS: dict[str, Kind] = {
+    "matcher": Choice(help="What matches tie points.", choices=MATCHERS),
+    "similarity": _SIMILARITY,
+    "refinement": _SIMILARITY,
+    "model": Choice(help="Model that is fitted.", choices=(AUTO, *KINDS)),
+    "radar": Choice(help="A radar's images.", choices=(AUTO, REFERENCE, INPUT, BOTH, NEITHER)),
+    "max_error_px": Number(help="Largest error.", unit="px", minimum=0.1, maximum=100),
+    "search_radius_m": Distance(help="Largest shift."),
+    "rotation_deg": Number(help="Largest rotation.", unit="°", minimum=0, maximum=180),
+    "scale": Number(help="Largest scale.", minimum=1),
+    "matching_pixel_size_m": Distance(help="Pixel size for matching.", minimum=1e-6),
+    "tries": Number(help="Number of registrations.", minimum=1, integer=True),
+}
+_CANDIDATE = Choice(help="Model that may be chosen.", choices=tuple(PARAMETERS))
+
+
 @dataclass(frozen=True)
 class Specification:
     """How a pair is registered; the registering tools are presets of it.
@@ -124,6 +144,11 @@ class Specification:
     is_placed
         Whether other registrations, which all rules accepted, place both images where they are: tie
         points are searched from there, and no survey is asked for.
+
+    Raises
+    ------
+    ParameterError
+        A value is none of its words, or out of its range.
     """
 
     matcher: str = CHIPS
@@ -145,6 +170,15 @@ class Specification:
     light: Light | None = None
     surface_view: View | None = None
     is_placed: bool = False
+
+    def __post_init__(self) -> None:
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            # None stands for what is usual where it is the default.
+            if value is not None or getattr(Specification, name) is not None:
+                kind.check(name, value)
+        for candidate in self.candidates:
+            _CANDIDATE.check("candidates", candidate)
 
     @property
     def is_rendered(self) -> bool:
