@@ -165,9 +165,9 @@ class Raster:
 
     @property
     def identity(self) -> Hashable:
-        """The same for rasters whose pixels are the same memory."""
+        """The same for rasters whose pixels are the same numbers in the same memory."""
         held = np.ma.getdata(self.values)
-        return held.__array_interface__["data"][0], held.shape, held.strides
+        return held.__array_interface__["data"][0], held.shape, held.strides, held.dtype.str
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         held = np.asarray(self.values, dtype)

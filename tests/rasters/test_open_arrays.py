@@ -176,6 +176,13 @@ class TestIdentity:
         assert open_raster(one).is_same_as(open_raster(one))
         assert not open_raster(one).is_same_as(open_raster(other))
 
+    @pytest.mark.parametrize("dtype", ["uint64", "complex64", ">f8"])
+    def test_other_numbers_in_the_same_memory_are_another_raster(self, dtype: str) -> None:
+        values = RNG.normal(size=(40, 60))
+        other = open_raster(values.view(dtype))
+        assert not open_raster(values).is_same_as(other)
+        assert open_raster(values).is_same_as(open_raster(values[:]))
+
     def test_a_dataset_is_its_file(self, tmp_path: Path) -> None:
         path = write_raster(tmp_path / "a.tif", image("uint8"), GRID)
         with rasterio.open(path) as dataset:
