@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,12 @@ from textured_pairs import texture
 from groundtie import Raster, steps
 from groundtie.errors import NoOverlapError, ParameterError, TooFewPointsError
 from groundtie.geometry.fitting import fit_model
+from groundtie.geometry.models import shift_model
+from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
 from groundtie.registration.evidence import RegistrationEvidence
+from groundtie.registration.specification import COREGISTER
 from groundtie.similarity.surface import SIMILARITIES
 
 SIZE = 384
@@ -33,6 +37,19 @@ def pair(seed: int = 0, noise: float = 0.2) -> tuple[Any, Any]:
     noisy = np.random.default_rng(seed + 9).normal(0, noise, (SIZE, SIZE))
     reference = scene[MARGIN : MARGIN + SIZE, MARGIN : MARGIN + SIZE]
     return reference, -scene[top : top + SIZE, left : left + SIZE] + noisy
+
+
+def no_points() -> TiePoints:
+    none = np.zeros((0, 2))
+    return TiePoints(
+        reference_xy=none,
+        input_px=none,
+        score=none[:, 0],
+        covariance_px2=np.zeros((0, 2, 2)),
+        forward_backward_error_px=none[:, 0],
+        is_check=np.zeros(0, bool),
+        state=np.zeros(0, "U9"),
+    )
 
 
 class TestSurface:
@@ -92,6 +109,27 @@ class TestSurface:
             steps.similarity_surface(*(np.ones(shape) for shape in shapes), 10)
 
 
+class TestPeak:
+    def test_a_surface_need_not_be_square(self) -> None:
+        """As a user cuts it, or has it from elsewhere, in lists."""
+        y, x = np.mgrid[-10:11, -20:21]
+        surface = 9 - 0.4 * (x - 3.2) ** 2 - 0.3 * (y - 2.1) ** 2
+        for given in (surface, surface.tolist()):
+            assert steps.find_peak(given).shift_px == pytest.approx((3.2, 2.1))
+
+    @pytest.mark.parametrize("shape", [(20, 20), (21, 20), (5,), (3, 21, 21), (0, 0), ()])
+    def test_a_surface_without_a_middle(self, shape: tuple[int, ...]) -> None:
+        with pytest.raises(ParameterError, match="must have odd numbers of rows and columns, not"):
+            steps.find_peak(np.zeros(shape))
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf, 1j, "a"])
+    def test_what_is_no_finite_number(self, value: Any) -> None:
+        surface = np.zeros((21, 21)).astype(np.result_type(type(value)))
+        surface[4, 5] = value
+        with pytest.raises(ParameterError, match="must hold finite numbers: 0 where nothing is"):
+            steps.find_peak(surface)
+
+
 class TestFit:
     def made(self, kind: str, outliers: int, unit: float = 1.0) -> tuple[Any, Any, Any]:
         rng = np.random.default_rng(1)
@@ -114,6 +152,38 @@ class TestFit:
         assert np.median(errors) < 0.15 * unit
         np.testing.assert_allclose(fit.model.inverse(fit.model(xy)), xy, atol=1e-4 * unit)
 
+    @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2", "tps"])
+    @pytest.mark.parametrize("turn", [15, 90, 180])
+    def test_any_rotation(self, kind: str, turn: int) -> None:
+        """Two fifths are outliers, as far off as any place of the image."""
+        rng = np.random.default_rng(turn)
+        xy = rng.uniform(0, 300, (100, 2))
+        cos, sin = np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))
+        truth = xy @ np.array([[cos, sin], [-sin, cos]]) + SHIFT
+        found = truth + rng.normal(0, 0.1, xy.shape)
+        found[:40] = rng.permutation(found[:40])
+        fit = steps.fit_model(kind, xy, found, radius_px=300)
+        assert fit.inliers[40:].all() and fit.inliers.sum() < 64
+        np.testing.assert_allclose(fit.model(xy), truth, atol=0.5)
+        np.testing.assert_allclose(fit.model.inverse(truth), xy, atol=0.5)
+
+    @pytest.mark.parametrize("scale", [0.3, 1.25, 4.0])
+    def test_any_scale(self, scale: float) -> None:
+        xy = self.made("affine", 0)[0]
+        fit = steps.fit_model("similarity", xy, scale * xy)
+        assert fit.inliers.all()
+        np.testing.assert_allclose(fit.model(xy), scale * xy, atol=1e-6)
+
+    @pytest.mark.parametrize("noise", [1e-3, 0.05, 1.0, 2.4])
+    @pytest.mark.parametrize("unit", [1.0, 10.0])
+    def test_sigma_is_that_of_the_residuals(self, noise: float, unit: float) -> None:
+        rng = np.random.default_rng(2)
+        xy = rng.uniform(0, 1000, (400, 2))
+        found = xy + SHIFT + rng.normal(0, noise, xy.shape)
+        fit = steps.fit_model("translation", unit * xy, unit * found, pixel_size=unit)
+        # Of 800 numbers it is known to 1 / √1600, 2.5 %.
+        assert fit.sigma == pytest.approx(noise * unit, rel=0.08)
+
     def test_too_few_points(self) -> None:
         with pytest.raises(TooFewPointsError, match="at least 3 points; there are 2"):
             steps.fit_model("translation", np.zeros((2, 2)), np.zeros((2, 2)))
@@ -122,12 +192,98 @@ class TestFit:
         with pytest.raises(ParameterError, match=r"one of translation, .*, not 'rubb'"):
             steps.fit_model("rubb", np.zeros((9, 2)), np.zeros((9, 2)))
 
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"pixel_size": 0}, "pixel_size must be above 0, not 0"),
+            ({"pixel_size": -1}, "pixel_size must be at least 0, not -1"),
+            ({"pixel_size": "a"}, "pixel_size must be a number, not 'a'"),
+            ({"tolerance_px": 0}, "tolerance_px must be above 0, not 0"),
+            ({"tolerance_px": np.nan}, "tolerance_px must be a finite number, not nan"),
+            ({"radius_px": -0.5}, "radius_px must be at least 0 px, not -0.5"),
+            ({"radius_px": np.inf}, "radius_px must be a finite number, not inf"),
+            ({"seed": -1}, "seed must be at least 0, not -1"),
+            ({"seed": 1.5}, "seed must be a whole number, not 1.5"),
+        ],
+    )
+    def test_what_is_out_of_range(self, asked: dict[str, Any], message: str) -> None:
+        xy, _, found = self.made("translation", 0)
+        with pytest.raises(ParameterError, match=message):
+            steps.fit_model("translation", xy, found, **asked)
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf])
+    def test_a_position_that_is_none(self, value: float) -> None:
+        xy, _, found = self.made("affine", 0)
+        found[7] = value
+        with pytest.raises(ParameterError, match=r"positions must be finite numbers; 1 of 60 are"):
+            steps.fit_model("affine", xy, found)
+
+    def test_positions_that_are_no_numbers(self) -> None:
+        with pytest.raises(ParameterError, match="positions must be numbers: could not convert"):
+            steps.fit_model("affine", "abc", [["a"]])
+
     def test_positions_that_are_no_pairs(self) -> None:
         xy, _, found = self.made("affine", 0)
         with pytest.raises(ParameterError, match=r"the shape \(\.\.\., 2\), not \(2, 60\)"):
             steps.fit_model("affine", xy.T, found.T)
         with pytest.raises(ParameterError, match=r"60 positions .*, but 59 in the input"):
             steps.fit_model("affine", xy, found[1:])
+
+
+class TestWhatCannotBeMatchedOrJudged:
+    """One line, before anything is opened."""
+
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"radius_px": 0}, "radius_px must be at least 1 px, not 0"),
+            ({"radius_px": 2.5}, "radius_px must be a whole number, not 2.5"),
+            ({"radius_px": "a"}, "radius_px must be a number, not 'a'"),
+            ({"model": "x"}, "model must be a Model, not a str"),
+            ({"spec": "x"}, "spec must be a Specification, not a str"),
+            ({"context": "x"}, "context must be a Context, not a str"),
+        ],
+    )
+    def test_match_chips(self, asked: dict[str, Any], message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            steps.match_chips("reference.tif", "input.tif", **asked)
+
+    @pytest.mark.parametrize(
+        ("asked", "message"),
+        [
+            ({"model": None}, "model must be a Model, not a NoneType"),
+            ({"model": steps.Fit(shift_model(0, 0), np.ones(3, bool), 1.0)}, "not a Fit"),
+            ({"points": [[0, 0]]}, "points must be a TiePoints, not a list"),
+            ({"spec": "x"}, "spec must be a Specification, not a str"),
+        ],
+    )
+    def test_judge(self, asked: dict[str, Any], message: str) -> None:
+        given = {"model": shift_model(0, 0), "points": no_points()} | asked
+        with pytest.raises(ParameterError, match=message):
+            steps.judge("reference.tif", "input.tif", **given)
+
+    def test_a_model_of_no_points_is_refused(self) -> None:
+        verdict = steps.judge(*pair(), shift_model(0, 0), no_points())
+        assert not verdict.accepted
+        assert verdict.rule == "too few points"
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"matcher": "foo"}, "matcher must be one of chips, keypoints, guided-chips, not 'foo'"),
+        ({"similarity": "foo"}, "similarity must be one of fused, nmi, .*, not 'foo'"),
+        ({"refinement": None}, "refinement must be one of fused, nmi, .*, not None"),
+        ({"model": "foo"}, "model must be one of auto, translation, .*, not 'foo'"),
+        ({"candidates": ("affine", "foo")}, "candidates must be one of translation, .*, not"),
+        ({"radar": "foo"}, "radar must be one of auto, reference, input, both, neither, not"),
+        ({"max_error_px": float("nan")}, "max_error_px must be a finite number from 0 on, not nan"),
+        ({"search_radius_m": -5}, "search_radius_m must be a finite number from 0 on, not -5"),
+    ],
+)
+def test_what_cannot_be_specified(asked: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        replace(COREGISTER, **asked)
 
 
 class TestFromImagesToVerdict:

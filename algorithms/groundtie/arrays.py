@@ -66,9 +66,10 @@ class Raster:
     called: str = ""
 
     def __post_init__(self) -> None:
+        own = np.asanyarray(self.values).dtype.newbyteorder("=")
         object.__setattr__(self, "values", _pixels(self.values))
         object.__setattr__(self, "crs", _crs(self.crs))
-        object.__setattr__(self, "nodata", _nodata(self.nodata))
+        object.__setattr__(self, "nodata", _nodata(self.nodata, own))
         if self.transform is None and self.crs is not None:
             raise GeoreferencingError("an array with a CRS needs its transform, too")
         if self.transform is not None and not isinstance(self.transform, Affine):
@@ -164,9 +165,9 @@ class Raster:
 
     @property
     def identity(self) -> Hashable:
-        """The same for rasters whose pixels are the same memory."""
+        """The same for rasters whose pixels are the same numbers in the same memory."""
         held = np.ma.getdata(self.values)
-        return held.__array_interface__["data"][0], held.shape, held.strides
+        return held.__array_interface__["data"][0], held.shape, held.strides, held.dtype.str
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         held = np.asarray(self.values, dtype)
@@ -255,8 +256,12 @@ def _crs(crs: Any) -> CRS | None:
         raise ParameterError(f"no coordinate reference system: {crs!r}") from error
 
 
-def _nodata(nodata: Any) -> Any:
+def _nodata(nodata: Any, own: np.dtype[Any]) -> Any:
     if nodata is not None and not isinstance(nodata, Real):
         raise ParameterError(f"nodata must be a number, not {nodata!r}")
+    if nodata is not None and own == np.float16:
+        # As the array had to round it; no tolerance for single precision is as wide.
+        with np.errstate(over="ignore"):
+            return float(np.float16(nodata))
     # Not as a float, which would round large whole numbers.
     return nodata

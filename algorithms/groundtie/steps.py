@@ -35,7 +35,8 @@ from .registration.specification import COREGISTER, Specification
 from .registration.stages import Stages
 from .registration.verdict import Verdict, judge_search
 from .similarity.description import BORDER_PX
-from .similarity.peak import Peak, find_peak
+from .similarity.peak import Peak
+from .similarity.peak import find_peak as peak_of
 from .similarity.surface import SIMILARITIES, SimilaritySettings, Surface, describe
 from .similarity.surface import similarity_surface as surface_of
 
@@ -54,6 +55,12 @@ __all__ = [
 _USUAL_SIGMA_PX = 0.25
 
 _RADIUS = Number(help="Largest shift.", unit="px", minimum=0, integer=True)
+# With none, a surface has no peak inside.
+_MATCH_RADIUS = replace(_RADIUS, minimum=1)
+_REACH = replace(_RADIUS, integer=False)
+_SIZE = Number(help="Size, above 0.", minimum=0)
+_SEED = Number(help="Seed of random numbers.", minimum=0, integer=True)
+_KIND = Choice(help="Kind of model.", choices=KINDS)
 _SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
 
 
@@ -95,12 +102,36 @@ def similarity_surface(
         least = 2 * (radius_px + BORDER_PX) + 1
         raise ParameterError(f"windows must have {least} pixels a side for a radius of {radius_px}")
     compared = windows[0].inner(radius_px + BORDER_PX), windows[1].inner(BORDER_PX)
-    if any(map(_is_constant, compared)):
+    if any(window.is_flat for window in compared):
         # Its mutual information is nothing but rounding, of which a peak would be made.
         return np.zeros((2 * radius_px + 1,) * 2, np.float32)
     settings = SimilaritySettings(similarity)
     template, search = (describe(w, chip_pixels[0] * chip_pixels[1], settings) for w in windows)
     return surface_of(template.inner(radius_px), search, radius_px, settings)
+
+
+def find_peak(surface: ArrayLike) -> Peak:
+    """Return the highest peak of a surface: its shift, covariance and height.
+
+    Parameters
+    ----------
+    surface
+        As of `similarity_surface`, shape (2 r + 1, 2 q + 1), shift 0 in its middle; 0, the
+        background's value, where nothing is known.
+
+    Raises
+    ------
+    ParameterError
+        It has no middle, or holds what is no finite number.
+    """
+    values = np.asarray(surface)
+    if values.ndim != 2 or 0 in np.mod(values.shape, 2):
+        raise ParameterError(
+            f"a surface must have odd numbers of rows and columns, not {values.shape}"
+        )
+    if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+        raise ParameterError("a surface must hold finite numbers: 0 where nothing is known")
+    return peak_of(values)
 
 
 def match_chips(
@@ -127,8 +158,15 @@ def match_chips(
         How chips are laid out, masked and compared.
     context
         Threads and progress; None: a thread for each processor.
+
+    Raises
+    ------
+    ParameterError
+        The radius is no whole number from 1 on, or something is of another type.
     """
     model = shift_model(0.0, 0.0) if model is None else model
+    _require("model", model, Model)
+    radius_px = int(_MATCH_RADIUS.check("radius_px", radius_px))
     with _stages(reference, input, spec, context) as (stages, running):
         places = stages.matcher.fit_places(stages.held_out.layout)
         surfaces = stages.matcher.match(model, places, radius_px, running)
@@ -186,20 +224,30 @@ def fit_model(
     Raises
     ------
     ParameterError
-        There is no such kind of model, or the positions are no pairs.
+        There is no such kind of model, the positions are no pairs of finite numbers, or a number is
+        out of its range.
     TooFewPointsError
         Too few pairs agree with a model of this kind.
     """
-    if kind not in KINDS:
-        raise ParameterError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    kind = _KIND.check("kind", kind)
+    pixel_size = _above_0("pixel_size", pixel_size)
+    tolerance_px = _above_0("tolerance_px", tolerance_px)
+    radius_px = _REACH.check("radius_px", radius_px)
+    seed = int(_SEED.check("seed", seed))
     px, nominal_px = (as_positions(p).reshape(-1, 2) / pixel_size for p in (xy, nominal_xy))
     if len(px) != len(nominal_px):
         raise ParameterError(
             f"{len(px)} positions in the reference, but {len(nominal_px)} in the input"
         )
+    finite = np.isfinite(np.hstack([px, nominal_px])).all(axis=1)
+    if not finite.all():
+        raise ParameterError(
+            f"positions must be finite numbers; {(~finite).sum()} of {len(px)} are not"
+        )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
-    start = find_consensus(px, nominal_px, tolerance_px, kind, seed)
+    # A person's own points may be of images of any rotation and scale.
+    start = find_consensus(px, nominal_px, tolerance_px, kind, seed, np.inf)
     model, mixture = fit_robustly(
         kind,
         px,
@@ -208,7 +256,10 @@ def fit_model(
         start,
         (2 * radius_px + 1) ** 2,
     )
-    return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, mixture.sigma * pixel_size)
+    residuals = (nominal_px - model(px))[mixture.inliers]
+    # The mixture's own is kept within what matches have.
+    sigma = float(np.sqrt((residuals**2).mean())) * pixel_size
+    return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, sigma)
 
 
 def judge(
@@ -236,7 +287,14 @@ def judge(
         How the images are inspected, masked and compared, and the largest error that is accepted.
     context
         Threads and progress; None: a thread for each processor.
+
+    Raises
+    ------
+    ParameterError
+        Something is of another type.
     """
+    _require("model", model, Model)
+    _require("points", points, TiePoints)
     with _stages(reference, input, spec, context) as (stages, running):
         pair = stages.masked.pair
         transform = pair.transform(model)
@@ -257,6 +315,9 @@ def _stages(
     reference: Any, input: Any, spec: Specification, context: Context | None
 ) -> Iterator[tuple[Stages, Context]]:
     """Open a pair and put the stages of its registration together."""
+    _require("spec", spec, Specification)
+    if context is not None:
+        _require("context", context, Context)
     with (
         threads() if context is None else nullcontext(context) as running,
         bounded_cache(),
@@ -265,10 +326,16 @@ def _stages(
         yield Stages.of(opened.images, mask_pair(opened, spec, running.quiet()), spec), running
 
 
-def _is_constant(window: Patch) -> bool:
-    """Return whether the valid pixels of a window hold one value, if any."""
-    known = window.values[window.valid]
-    return bool((known == known[:1]).all())
+def _require(name: str, value: Any, kind: type) -> None:
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name} must be a {kind.__name__}, not a {type(value).__name__}")
+
+
+def _above_0(name: str, value: Any) -> float:
+    number = _SIZE.check(name, value)
+    if number == 0:
+        raise ParameterError(f"{name} must be above 0, not 0")
+    return number
 
 
 def _patch(image: ArrayLike) -> Patch:

@@ -78,6 +78,20 @@ def test_nodata_is_any_number(nodata: Any) -> None:
         np.testing.assert_array_equal(source.read(source.window)[1], [[True, False]])
 
 
+@pytest.mark.parametrize("dtype", ["<f2", ">f2"])
+@pytest.mark.parametrize("nodata", [0.1, -9999, 65504, 1e6])
+def test_nodata_is_what_the_array_can_hold(nodata: float, dtype: str) -> None:
+    """The half-precision number next to -9999 is -10000."""
+    values = np.ones((2, 3))
+    values[0, 0] = nodata
+    with (
+        np.errstate(over="ignore"),
+        open_raster(Raster(values.astype(dtype), nodata=nodata)) as one,
+    ):
+        valid = one.read(one.window)[1]
+    np.testing.assert_array_equal(valid, [[False, True, True], [True, True, True]])
+
+
 def test_a_masked_array_is_read_as_a_file_with_a_mask(tmp_path: Path) -> None:
     values = image("uint16", bands=1)
     mask = np.zeros((40, 60), bool)
@@ -161,6 +175,13 @@ class TestIdentity:
         one, other = np.zeros((40, 60)), np.zeros((40, 60))
         assert open_raster(one).is_same_as(open_raster(one))
         assert not open_raster(one).is_same_as(open_raster(other))
+
+    @pytest.mark.parametrize("dtype", ["uint64", "complex64", ">f8"])
+    def test_other_numbers_in_the_same_memory_are_another_raster(self, dtype: str) -> None:
+        values = RNG.normal(size=(40, 60))
+        other = open_raster(values.view(dtype))
+        assert not open_raster(values).is_same_as(other)
+        assert open_raster(values).is_same_as(open_raster(values[:]))
 
     def test_a_dataset_is_its_file(self, tmp_path: Path) -> None:
         path = write_raster(tmp_path / "a.tif", image("uint8"), GRID)

@@ -102,6 +102,32 @@ def test_nodata_of_floating_point_rasters(tmp_path: Path, nodata: float) -> None
     np.testing.assert_array_equal(values, np.where(expected, IMAGE, 0))
 
 
+@pytest.mark.parametrize("bad", [1e39, -1.7976931348623157e308, 1e300 + 1e300j])
+@pytest.mark.parametrize("bands", [1, 2])
+@pytest.mark.parametrize("out_shape", [None, (20, 30)])
+def test_what_single_precision_cannot_hold_is_as_nan(
+    bad: complex, bands: int, out_shape: tuple[int, int] | None
+) -> None:
+    """Fill values that other programs do not declare, as the lowest number that there is."""
+    values = np.full((bands, 40, 60), 5.0, np.result_type(type(bad)))
+    holed = values.copy()
+    values[:, :2, :3], holed[:, :2, :3] = bad, np.nan
+    found, expected = (
+        open_raster(image).read(Window(0, 0, 60, 40), out_shape=out_shape)
+        for image in (values, holed)
+    )
+    np.testing.assert_array_equal(found, expected)
+    assert not found[1][0, 0] and found[1][-1, -1]
+
+
+def test_means_that_single_precision_cannot_hold_are_as_nan() -> None:
+    values = np.full((40, 60), 5.0, np.float32)
+    values[:4, :4] = np.finfo(np.float32).min
+    found, valid = open_raster(values).read(Window(0, 0, 60, 40), out_shape=(20, 30))
+    assert np.isfinite(found).all()
+    np.testing.assert_array_equal(valid, (found == 5))
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_numbers_that_are_not_finite_are_invalid(tmp_path: Path, bad: float) -> None:
     image = IMAGE.astype(np.float32)

@@ -81,16 +81,48 @@ def test_grey_values_against_opencv(level: float) -> None:
     np.testing.assert_allclose(correlate_grey(template, search), expected, atol=2e-4)
 
 
-@pytest.mark.parametrize("level", [0.0, 300.0])
-def test_masked_grey_values_against_their_definition(level: float) -> None:
+def coefficients(template: Patch, search: Patch) -> np.ndarray:
     """Padfield 2012: the correlation coefficient of the pixels that are valid in both."""
-    template, search = patches(True, level=level)
     expected = np.empty((SPAN, SPAN))
     for dy, dx in np.ndindex(SPAN, SPAN):
         both = template.valid & windows_of(search.valid)[dy, dx]
         pair = template.values[both], windows_of(search.values)[dy, dx][both]
         expected[dy, dx] = np.corrcoef(*(p.astype(float) for p in pair))[0, 1]
+    return expected
+
+
+@pytest.mark.parametrize("level", [0.0, 300.0])
+def test_masked_grey_values_against_their_definition(level: float) -> None:
+    template, search = patches(True, level=level)
+    expected = coefficients(template, search)
     np.testing.assert_allclose(correlate_grey(template, search), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("strong", [1e2, 1e3, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("which", [0, 1])
+def test_masked_grey_values_beside_a_scatterer(which: int, strong: float) -> None:
+    """Which few of the shifts see, or all but where it meets a pixel that is not valid."""
+    both = patches(True)
+    at = (SHAPE[0] // 2, SHAPE[1] // 2) if which == 0 else (1, 1)
+    both[which].values[at], both[which].valid[at] = 20 * strong, True
+    found = correlate_grey(*both)
+    np.testing.assert_allclose(found, coefficients(*both), atol=1e-3)
+    # It is exact for others beside it, too.
+    beside = patches(True, seed=5)
+    stacks = [
+        Patch(np.stack([p.values for p in side]), np.stack([p.valid for p in side]))
+        for side in zip(beside, both, strict=True)
+    ]
+    np.testing.assert_array_equal(correlate_grey(*stacks), [correlate_grey(*beside), found])
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize("unit", [1e-30, 1e-9, 1e30])
+def test_grey_values_of_any_unit(masked: bool, unit: float) -> None:
+    template, search = patches(masked)
+    scaled = (Patch(patch.values * np.float32(unit), patch.valid) for patch in (template, search))
+    expected = coefficients(template, search)
+    np.testing.assert_allclose(correlate_grey(*scaled), expected, atol=1e-3)
 
 
 def test_contrast_and_brightness_do_not_matter_but_inversion_does() -> None:

@@ -75,6 +75,16 @@ def test_a_peak_at_the_border_may_be_none(place: tuple[int, int]) -> None:
     assert found.shift_px == place
 
 
+@pytest.mark.parametrize("part", [np.s_[3:-3, :], np.s_[:, 4:-4]])
+def test_the_middle_is_no_shift_whatever_the_shape(part: tuple[slice, slice]) -> None:
+    found = find_peak(gaussian(3.3, 2.2)[part].astype(np.float32))
+    assert found.shift_px == pytest.approx((3.3, 2.2), abs=0.02)
+    # Anywhere in the window, along each axis: the variance of an even distribution.
+    empty = np.zeros_like(X[part])
+    expected = np.array(empty.shape[::-1]) ** 2 / 12
+    np.testing.assert_allclose(np.diag(find_peak(empty).covariance_px2), expected, rtol=0.15)
+
+
 def test_a_surface_without_peak() -> None:
     found = find_peak(np.zeros((9, 9), np.float32))
     assert found.at_border

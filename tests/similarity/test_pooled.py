@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, uniform_filter
+from scipy.stats import spearmanr
 from sklearn.metrics import mutual_info_score
 
 from groundtie.rasters.patch import Patch
@@ -98,6 +99,17 @@ def test_speckle_is_averaged_over_what_is_valid_alone() -> None:
     np.testing.assert_allclose(smooth(patch(values, ground)).values[ground], 3.0, rtol=1e-5)
 
 
+@pytest.mark.parametrize("mean_db", [-40.0, -12.0, 0.0, 12.0])
+def test_decibels_of_either_sign_keep_their_order(mean_db: float) -> None:
+    """As by the mean of decibels; 3 dB below 0 is not 3 dB above it."""
+    random = np.random.default_rng(5)
+    decibels = mean_db + 4 * gaussian_filter(random.normal(size=(90, 90)), 2.0) / 0.14
+    found = smooth(patch(decibels)).values
+    assert spearmanr(found, uniform_filter(decibels, 3), axis=None).statistic > 0.98
+    np.testing.assert_allclose(smooth(patch(-decibels)).values, -found, atol=1e-3)
+    np.testing.assert_allclose(smooth(patch(np.full((9, 9), -8.0))).values, -8.0, rtol=1e-5)
+
+
 def test_what_rounding_leaves_of_nothing_is_no_power() -> None:
     random = np.random.default_rng(0)
     ground = np.zeros((72, 72), bool)
@@ -105,3 +117,4 @@ def test_what_rounding_leaves_of_nothing_is_no_power() -> None:
     with np.errstate(invalid="raise"):
         found = smooth(patch(10 ** random.uniform(-3, 4, ground.shape), ground))
     assert np.isfinite(found.values).all()
+    assert (found.values >= 0).all()

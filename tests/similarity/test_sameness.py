@@ -158,6 +158,18 @@ def test_windows_of_two_places_are_rarely_related() -> None:
     assert 0 < related.mean() < 0.25
 
 
+def test_no_window_of_one_grey_value_is_related_to_one_that_varies() -> None:
+    """Nothing of what one shows follows from the other, which shows nothing: a sea, say."""
+    one, other = texture(120, 120, 1), texture(120, 120, 2)
+    other[:, 40:] = 5
+    constant = np.s_[:, 44:]
+    for pair in ((one, other), (other, one)):
+        assert not Windows.of(*map(patch, pair)).related[constant].any()
+    # Where both hold one grey value, as copies may, they still are.
+    one[:, 40:] = 300
+    assert Windows.of(patch(one), patch(other)).related[constant].all()
+
+
 def test_invalid_pixels_are_no_part_of_windows() -> None:
     one = texture(60, 60)
     spoilt = one.copy()

@@ -128,7 +128,14 @@ def fit_without_blocks(
     """Return the models of a kind that leave one block of points after the other out.
 
     Parameters are those of `fit_model`, in pixels; all models have one frame.
+
+    Raises
+    ------
+    TooFewPointsError
+        Fewer points than the model needs are left.
     """
+    if len(px) == 0:
+        raise TooFewPointsError(f"the {kind} model needs points; there are none")
     frame = Frame.around(px)
     return tuple(
         fit_model(kind, px, nominal_px, np.where(block, 0.0, weights), frame)

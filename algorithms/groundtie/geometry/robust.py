@@ -128,6 +128,7 @@ def find_consensus(
     tolerance: float,
     kind: str = "affine",
     seed: int = 0,
+    largest_distortion: float = _LARGEST_DISTORTION,
 ) -> Model:
     """Return the model of degree ≤ 1 that most pairs agree with (MSAC; [Torr2000]).
 
@@ -141,11 +142,16 @@ def find_consensus(
         One of `models.PARAMETERS`; of those that are more flexible, "affine" is fitted.
     seed
         Of the random samples.
+    largest_distortion
+        How far any coefficient of the linear part may be from the identity's.
     """
     kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
     frame = Frame.around(xy)
     uv, displacement = frame.enter(xy), frame.enter(nominal_xy) - frame.enter(xy)
     candidates = _sampled_models(uv, displacement, kind, np.random.default_rng(seed))
+    distortion = np.abs(candidates[:, 1:]).max(axis=(1, 2))
+    plausible = distortion < largest_distortion
+    candidates = candidates[plausible] if plausible.any() else candidates * 0
     design, in_frame = monomials(uv, 1), tolerance / frame.to_map.a
 
     def costs(some: slice) -> FloatArray:
@@ -249,5 +255,4 @@ def _sampled_models(
         # Three places on a line determine a shift only.
         coefficients[~well_posed] = 0.0
         coefficients[~well_posed, 0] = displacement[picks[~well_posed, 0]]
-    plausible = np.abs(coefficients[:, 1:]).max(axis=(1, 2)) < _LARGEST_DISTORTION
-    return np.asarray(coefficients[plausible] if plausible.any() else coefficients * 0)
+    return coefficients

@@ -181,9 +181,13 @@ def as_positions(values: ArrayLike) -> FloatArray:
     Raises
     ------
     ParameterError
-        The last axis holds something else, as where all x stand before all y.
+        They are no numbers, or the last axis holds something else, as where all x stand before all
+        y.
     """
-    positions = np.asarray(values, float)
+    try:
+        positions = np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"positions must be numbers: {error}") from error
     if positions.size and positions.shape[-1:] != (2,):
         raise ParameterError(f"positions must have the shape (..., 2), not {positions.shape}")
     return positions

@@ -154,9 +154,9 @@ class RasterSource:
         values
             Shape `out_shape`, amplitudes for complex rasters; 0 where invalid.
         valid
-            Same shape; False for nodata, masked and transparent pixels, NaN and infinity. A pixel
-            of a reduced result is valid if half of its area is; one of several bands if it is
-            valid in all.
+            Same shape; False for nodata, masked and transparent pixels, NaN, infinity and what
+            single precision cannot hold. A pixel of a reduced result is valid if half of its area
+            is; one of several bands if it is valid in all.
 
         Raises
         ------
@@ -169,11 +169,12 @@ class RasterSource:
 
         def grey(source: RasterSource, part: Window) -> tuple[NDArray[Any], Mask]:
             values, valid = source.read_bands(part, bands)
-            if self.is_complex:
-                values = np.abs(values)
-            if len(bands) == 1:
-                return values[0].astype(np.float32), valid[0]
-            return values.mean(axis=0, dtype=np.float32), np.asarray(valid.all(axis=0))
+            with np.errstate(over="ignore", invalid="ignore"):
+                if self.is_complex:
+                    values = np.abs(values)
+                one = len(bands) == 1
+                image = values[0].astype(np.float32) if one else values.mean(0, np.float32)
+            return image, np.asarray(valid.all(axis=0) & np.isfinite(image))
 
         if out_shape is None:
             values, valid = grey(self, window)
@@ -183,6 +184,8 @@ class RasterSource:
                 reduction = min(window.height / out_shape[0], window.width / out_shape[1])
                 level = self._overviews.coarsest(self, reduction)
             values, valid = average_window(grey, self, level, window, out_shape)
+            # Their sums may be larger than single numbers.
+            valid &= np.isfinite(values)
         return np.where(valid, values, np.float32(0)).astype(np.float32), valid
 
     def read_bands(

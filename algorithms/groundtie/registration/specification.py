@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from ..errors import ParameterError
 from ..geometry.judging import USUAL_MAX_ERROR_PX
+from ..geometry.models import KINDS, PARAMETERS
 from ..geometry.views import RADAR, View
 from ..kinds import AUTO
 from ..masks.used import INPUT, REFERENCE
 from ..matching.alignment import MODEL_CANDIDATES
 from ..raster_names import file_name
 from ..rasters.rendered import Light
+from ..similarity.surface import SIMILARITIES
 
 # What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
 # all over around a model of keypoints.
@@ -76,6 +80,17 @@ class StatedSurface:
         return (REFERENCE if is_radar[0] else INPUT) if any(is_radar) else NEITHER
 
 
+# What words may be.
+_WORDS: dict[str, tuple[str, ...]] = {
+    "matcher": MATCHERS,
+    "similarity": SIMILARITIES,
+    "refinement": SIMILARITIES,
+    "model": (AUTO, *KINDS),
+    "candidates": tuple(PARAMETERS),
+    "radar": (AUTO, REFERENCE, INPUT, BOTH, NEITHER),
+}
+
+
 @dataclass(frozen=True)
 class Specification:
     """How a pair is registered; the registering tools are presets of it.
@@ -124,6 +139,11 @@ class Specification:
     is_placed
         Whether other registrations, which all rules accepted, place both images where they are: tie
         points are searched from there, and no survey is asked for.
+
+    Raises
+    ------
+    ParameterError
+        A value is none of its words, or no finite number from 0 on.
     """
 
     matcher: str = CHIPS
@@ -145,6 +165,16 @@ class Specification:
     light: Light | None = None
     surface_view: View | None = None
     is_placed: bool = False
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name, value = field.name, getattr(self, field.name)
+            words = value if name == "candidates" else (value,)
+            known = _WORDS.get(name)
+            if known is not None and value != field.default and not set(words) <= set(known):
+                raise ParameterError(f"{name} must be one of {', '.join(known)}, not {value!r}")
+            if isinstance(value, (int, float)) and not 0 <= value < math.inf:
+                raise ParameterError(f"{name} must be a finite number from 0 on, not {value!r}")
 
     @property
     def is_rendered(self) -> bool:

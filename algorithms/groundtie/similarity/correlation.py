@@ -20,6 +20,9 @@ _ZERO = cv2.BORDER_CONSTANT
 # Overlaps of a smaller share of the template's pixels are not compared.
 MINIMUM_OVERLAP = 0.3
 
+# Variances count where rounding is at most this share of them: half the digits of single precision.
+_ROUNDING = math.sqrt(np.finfo(np.float32).eps)
+
 
 def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float32]:
     """Return Σ Re(conj(template) · search) at all shifts at which the template lies inside.
@@ -208,28 +211,71 @@ def _coefficients(t: FloatImage, s: FloatImage) -> FloatImage:
 def _centred(patch: Patch) -> FloatImage:
     """Return images without the means of their valid pixels, 0 where they are not valid.
 
-    Single precision would lose small contrast on large values.
+    Single precision would lose small contrast on large values. So that it holds squares in any
+    unit, images are scaled to 1, by a power of two: no digit changes.
     """
     counts = patch.valid.astype(np.float32)
     sums = (patch.values * counts).sum(axis=(-2, -1), keepdims=True)
     means = sums / np.maximum(counts.sum(axis=(-2, -1), keepdims=True), 1)
-    return (patch.values - means) * counts
+    centred = patch.values - means
+    centred *= counts
+    low, high = (of(centred, axis=(-2, -1), keepdims=True) for of in (np.min, np.max))
+    _, exponents = np.frexp(np.maximum(-low, high))
+    scale = np.ldexp(np.float32(1), np.minimum(-exponents, 127))
+    # What is left of a single grey value is rounding.
+    centred *= np.where(low < high, scale, np.float32(0))
+    return np.asarray(centred)
 
 
 def _masked_coefficients(
     t: FloatImage, t_valid: NDArray[np.bool_], s: FloatImage, s_valid: NDArray[np.bool_]
 ) -> FloatImage:
     """Return the correlation of images, 0 where they are not valid, by what is valid in both."""
+    found, is_exact = _coefficients_where_valid(t, t_valid, s, s_valid, np.float32)
+    if not is_exact.all():
+        # Scatterers far above all else: double precision takes more than twice the time.
+        rough = ~is_exact
+        part = t[rough], t_valid[rough], s[rough], s_valid[rough]
+        found[rough] = _coefficients_where_valid(*part, np.float64)[0]
+    return found
+
+
+def _coefficients_where_valid(
+    t: FloatImage,
+    t_valid: NDArray[np.bool_],
+    s: FloatImage,
+    s_valid: NDArray[np.bool_],
+    precision: type[np.floating],
+) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """Return coefficients, (n, ny, nx), and of which images they are exact at all shifts, (n,).
+
+    They are 0 where a precision does not give the variances.
+    """
     # Each of a window's three spectra serves several sums.
     shape = fast_shape(s)
-    of_t = spectrum(np.stack([t_valid.astype(np.float32), t, t * t]), shape).conj()
-    of_s = spectrum(np.stack([s_valid.astype(np.float32), s, s * s]), shape)
+    of_t, of_s = (
+        spectrum(
+            np.stack([valid.astype(precision), image, np.square(image, dtype=precision)]), shape
+        )
+        for image, valid in ((t, t_valid), (s, s_valid))
+    )
+    np.conj(of_t, out=of_t)
 
-    def sums(own: int, other: int) -> FloatImage:
-        return np.asarray(from_spectrum(of_t[own] * of_s[other], shape, spans(t, s)), np.float32)
+    def sums(own: int, other: int) -> NDArray[Any]:
+        return from_spectrum(of_t[own] * of_s[other], shape, spans(t, s))
 
     count, sum_t, sum_s = np.maximum(sums(0, 0), 1), sums(1, 0), sums(0, 1)
     covariance = sums(1, 1) - sum_t * sum_s / count
-    product = (sums(2, 0) - sum_t**2 / count) * (sums(0, 2) - sum_s**2 / count)
-    floor = 1e-6 * np.maximum(product.max(axis=(-2, -1), keepdims=True, initial=0), 1e-12)
-    return np.where(product > floor, covariance / np.sqrt(np.maximum(product, floor)), 0)
+    variance_t, variance_s = sums(2, 0) - sum_t**2 / count, sums(0, 2) - sum_s**2 / count
+    # Sums by spectra are rounded by a digit of the product of norms. Of a mask, and of squares up
+    # to 1 at most, a norm is the root of their sum, the spectrum's at frequency 0.
+    valid_t, _, squares_t = of_t[..., :1, :1].real
+    valid_s, _, squares_s = of_s[..., :1, :1].real
+    unit = np.finfo(precision).eps / _ROUNDING
+    known = (variance_t > unit * np.sqrt(squares_t * valid_s)) & (
+        variance_s > unit * np.sqrt(valid_t * squares_s)
+    )
+    product = np.where(known, variance_t * variance_s, 1)
+    found = np.where(known, covariance / np.sqrt(product), 0)
+    compared = count >= MINIMUM_OVERLAP * valid_t
+    return np.asarray(found, np.float32), np.asarray((known | ~compared).all(axis=(-2, -1)))

@@ -38,17 +38,17 @@ class Peak:
 
 
 def find_peak(surface: Surface) -> Peak:
-    """Return the highest peak of a surface, shape (2 r + 1, 2 r + 1), whose centre is shift 0.
+    """Return the highest peak of a surface, shape (2 r + 1, 2 q + 1), whose centre is shift 0.
 
     The sub-pixel position is the maximum of the paraboloid through the peak's surroundings. For
     a background of unit variance whose correlation has the peak's own shape, the covariance of
     the position is the inverse of the negative Hessian divided by the peak's height.
     """
-    radius = surface.shape[0] // 2
+    rows, cols = (side // 2 for side in surface.shape)
     row, col = (int(i) for i in np.unravel_index(surface.argmax(), surface.shape))
     height = float(surface[row, col])
-    wide = np.eye(2) * (radius + 1) ** 2 / 3.0
-    whole = (float(col - radius), float(row - radius))
+    wide = np.diag([(cols + 1) ** 2 / 3.0, (rows + 1) ** 2 / 3.0])
+    whole = (float(col - cols), float(row - rows))
     at_border = not (0 < row < surface.shape[0] - 1 and 0 < col < surface.shape[1] - 1)
     if at_border or height <= 0:
         return Peak(whole, height, wide, True)

@@ -106,13 +106,18 @@ class PooledHistogram:
 
 
 def smooth(patch: Patch) -> Patch:
-    """Return a patch with its power averaged over what is valid around each pixel."""
+    """Return a patch with its power averaged over what is valid around each pixel.
+
+    That of negative values, as of decibels, counts as negative: they stay below others.
+    """
     counts = patch.valid.astype(np.float32)
 
     def mean(image: FloatArray) -> FloatArray:
         return np.asarray(cv2.blur(image, (_SMOOTH_PX, _SMOOTH_PX)), np.float32)
 
+    signed = patch.values * np.abs(patch.values) * counts
     # Running sums leave a little, of either sign, where all is 0.
-    power = np.maximum(each(mean, np.square(patch.values) * counts), 0)
+    least = signed.min(axis=(-2, -1), keepdims=True, initial=0)
+    power = np.maximum(each(mean, signed), least)
     share = np.maximum(each(mean, counts), np.float32(1e-6))
-    return Patch(np.sqrt(power / share), patch.valid)
+    return Patch(np.copysign(np.sqrt(np.abs(power) / share), power), patch.valid)

@@ -87,9 +87,11 @@ class Windows:
     def related(self) -> Mask:
         """Around which pixels a linear function of one is half of the other.
 
-        As in copies, also those in other colours.
+        As in copies, also those in other colours. Nothing follows from a single grey value, but
+        another.
         """
-        return self.valid & (self.common**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other)
+        alike = self.common**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other
+        return self.valid & alike & ((self.one > 0) == (self.other > 0))
 
     @property
     def counts(self) -> tuple[int, int, int]:
