@@ -9,8 +9,9 @@ from textured_pairs import shift_on_map, texture
 
 from groundtie.context import Context
 from groundtie.geometry.transform import Transform
+from groundtie.matching.chip_windows import Resampled
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.phase_survey import survey_unexplained
+from groundtie.matching.phase_survey import PHASES_REACH_PX, survey_unexplained
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -38,7 +39,8 @@ def survey_of(
     with open_raster(paths[0]) as one, open_raster(paths[1]) as other:
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(shift_on_map(0, 0), pair.grid.crs, other.grid)
-        return survey_unexplained(pair, transform, ELSEWHERE_PX, context)
+        images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX, context)
+        return survey_unexplained(pair, images, ELSEWHERE_PX, context)
 
 
 @pytest.mark.parametrize("shift", [(14, -9), (-3, 20), (-22, 0), (7, 7)])

@@ -83,19 +83,24 @@ class ChipMatcher:
         context
             Threads and progress.
         """
-        kept, found = self._run(model, places, radius_px, context, ways=2)
+        kept, found = self._run(model, places, radius_px, context, 2)
         forward, backward = found[:, 0], found[:, 1]
         weight = _equal_weight(normalise(forward + backward))
         return ChipSurfaces(kept, forward, backward, weight)
 
     def match_forward(
-        self, model: Model, places: Places, radius_px: int, context: Context
+        self,
+        model: Model,
+        places: Places,
+        radius_px: int,
+        context: Context,
+        images: Resampled | None = None,
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and their surfaces, one way, at half the cost.
 
-        Parameters as `match`.
+        Parameters as `match`; `images` are the pair's, resampled by this model before.
         """
-        kept, found = self._run(model, places, radius_px, context, ways=1)
+        kept, found = self._run(model, places, radius_px, context, 1, images)
         return kept, found[:, 0]
 
     def fit_places(self, layout: ChipLayout) -> Places:
@@ -131,7 +136,13 @@ class ChipMatcher:
         return surfaces
 
     def _run(
-        self, model: Model, places: Places, radius_px: int, context: Context, ways: int
+        self,
+        model: Model,
+        places: Places,
+        radius_px: int,
+        context: Context,
+        ways: int,
+        images: Resampled | None = None,
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1).
 
@@ -139,8 +150,8 @@ class ChipMatcher:
         180° so that it peaks at the same place.
         """
         reach = radius_px + BORDER_PX
-        images = Resampled.by_model(self.pair, model, places.grid, reach, context)
-        windows = ChipWindows(images, places, reach, self.held_out)
+        seen = images or Resampled.by_model(self.pair, model, places.grid, reach, context)
+        windows = ChipWindows(seen, places, reach, self.held_out)
 
         def of_chips(chips: Description, search: Description) -> Surface:
             inner = chips.inner(radius_px)

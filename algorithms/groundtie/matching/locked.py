@@ -115,6 +115,7 @@ def find_locked_content(
     sensors: Sensors,
     exact_px: float,
     context: Context,
+    images: Resampled | None = None,
 ) -> LockedContent | None:
     """Return what the images repeat where a transform has them.
 
@@ -132,6 +133,9 @@ def find_locked_content(
         Within this of whole pixels, what was found lies on them as exactly as it is known.
     context
         Threads.
+    images
+        The pair's, resampled by the transform with 21 px and more around them; None: they are
+        resampled here.
 
     Returns
     -------
@@ -148,9 +152,10 @@ def find_locked_content(
         return None
 
     def windows(by: PointFunction) -> ChipWindows:
+        known = images if by is transform else None
         # Chips may end a pixel beyond the grid.
-        images = Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
-        return ChipWindows(images, places, LOOK_REACH_PX, None)
+        seen = known or Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
+        return ChipWindows(seen, places, LOOK_REACH_PX, None)
 
     is_near, seen = off_px <= _NEAR_PX, windows(to_input)
     unresampled = windows(whole) if is_near and to_input is not whole else seen

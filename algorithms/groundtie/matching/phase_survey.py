@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..context import Context
-from ..geometry.transform import Transform
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.peak import peak_shifts
@@ -23,12 +22,12 @@ from .survey import SURVEY_RADIUS_PX, Survey
 
 # Windows of 192 px, as for bands, overlap by two thirds and reach beyond the borders, until there
 # are so many along a side.
-_CHIP_PX, _REACH_PX, _MOST_ALONG = 64, 64, 7
-_SIDE_PX = _CHIP_PX + 2 * _REACH_PX
+_CHIP_PX, PHASES_REACH_PX, _MOST_ALONG = 64, 64, 7
+_SIDE_PX = _CHIP_PX + 2 * PHASES_REACH_PX
 
 
 def survey_unexplained(
-    pair: ImagePair, transform: Transform, elsewhere_px: float, context: Context
+    pair: ImagePair, images: Resampled, elsewhere_px: float, context: Context
 ) -> Survey:
     """Correlate what the reference does not explain of the input with the reference, all over.
 
@@ -36,8 +35,8 @@ def survey_unexplained(
     ----------
     pair
         The images.
-    transform
-        What was found.
+    images
+        The same, resampled by what was found, with `PHASES_REACH_PX` around them.
     elsewhere_px
         See `Survey`.
     context
@@ -46,8 +45,7 @@ def survey_unexplained(
     places = Places.spread(
         pair.grid, _CHIP_PX, lambda side: np.clip(side // _CHIP_PX, 1, _MOST_ALONG)
     )
-    images = Resampled.of(pair, transform, places.grid, _REACH_PX, context)
-    windows = ChipWindows(images, places, _REACH_PX, None, unexplained)
+    windows = ChipWindows(images, places, PHASES_REACH_PX, None, unexplained)
     _, found = windows.map(_surfaces, context)
     surfaces = np.stack(found)
     return Survey(places.grid, places.centres, peak_shifts(surfaces), surfaces, elsewhere_px)

@@ -18,6 +18,7 @@ from ..similarity.order_statistics import robust_deviation
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
+from .chip_windows import Resampled
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .matcher import MaskOf, Places
 from .parts import ELSEWHERE_PX, MOST_OF_ONE, Part, find_parts
@@ -151,6 +152,7 @@ def survey_model(
     elsewhere_px: float,
     context: Context,
     without: MaskOf | None = None,
+    images: Resampled | None = None,
 ) -> Survey:
     """Match chips all over a pair around what a model on the map predicts.
 
@@ -168,8 +170,11 @@ def survey_model(
         Threads and progress.
     without
         Returns for a piece of the grid which pixels of the reference are left out; None: none.
+    images
+        The pair's, resampled by the model with the radius and more around them; None: they are
+        resampled here.
     """
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
-    kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context)
+    kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context, images)
     return Survey(places.grid, kept, peak_shifts(surfaces), surfaces, elsewhere_px)

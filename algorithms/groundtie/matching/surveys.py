@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from ..context import Context
 from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
+from .chip_windows import Resampled
 from .chips import ChipMatcher
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
-from .phase_survey import survey_unexplained
+from .phase_survey import PHASES_REACH_PX, survey_unexplained
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
@@ -106,16 +107,19 @@ def survey_all(
     context
         Threads and progress.
     """
-    model, elsewhere_px = transform.model, accuracy_px[0]
-    whole = survey_model(matcher, model, places, elsewhere_px, context.part(0.0, 0.4))
+    pair, model, elsewhere_px = matcher.pair, transform.model, accuracy_px[0]
+    # Once for all; chips may end a pixel beyond the grid.
+    images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX + 1, context)
+    part = context.part(0.0, 0.4)
+    whole = survey_model(matcher, model, places, elsewhere_px, part, images=images)
     rest = ground = unexplained = None
     if sensors is not None:
         part = context.part(0.4, 0.9)
-        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, part)
-        unexplained = survey_unexplained(matcher.pair, transform, elsewhere_px, context.quiet())
+        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, images, part)
+        unexplained = survey_unexplained(pair, images, elsewhere_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
-        ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground)
+        ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground, images)
     return Surveys(whole, rest, ground, unexplained=unexplained)
 
 
@@ -125,11 +129,12 @@ def survey_rest(
     places: Places,
     accuracy_px: tuple[float, float],
     sensors: Sensors,
+    images: Resampled,
     context: Context,
 ) -> Rest | None:
     """Return what chips show without content that is the same in both arrays.
 
-    Parameters as `survey_all`.
+    Parameters as `survey_all`, and the images resampled by the transform.
 
     Returns
     -------
@@ -139,7 +144,8 @@ def survey_rest(
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     elsewhere_px, exact_px = accuracy_px
-    locked = find_locked_content(pair, transform, asked, sensors, exact_px, context.quiet())
+    quiet = context.quiet()
+    locked = find_locked_content(pair, transform, asked, sensors, exact_px, quiet, images)
     if locked is None:
         return None
     shared, chips = locked.shared, len(places.centres)
@@ -152,7 +158,7 @@ def survey_rest(
     once = replace(context, memo=None)
 
     def left_without(mask: MaskOf) -> Survey:
-        return survey_model(fused, transform.model, places, elsewhere_px, once, mask)
+        return survey_model(fused, transform.model, places, elsewhere_px, once, mask, images)
 
     if not shared.is_evident:
         left = left_without(locked)
