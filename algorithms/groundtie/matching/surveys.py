@@ -62,7 +62,7 @@ class Surveys:
     fine
         Of smaller chips, which show smaller parts; None: the others are as small.
     unexplained
-        Of what the reference does not explain of the input; None: as `rest`.
+        Of what the reference does not explain of the input; None: one image is rendered.
     """
 
     whole: Survey | None = None
