@@ -40,7 +40,7 @@ def survey_of(
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(shift_on_map(0, 0), pair.grid.crs, other.grid)
         images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX, context)
-        return survey_unexplained(pair, images, ELSEWHERE_PX, context)
+        return survey_unexplained(images, ELSEWHERE_PX, context)
 
 
 @pytest.mark.parametrize("shift", [(14, -9), (-3, 20), (-22, 0), (7, 7)])

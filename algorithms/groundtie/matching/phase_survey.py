@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..context import Context
-from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.peak import peak_shifts
 from ..similarity.phases import phase_surface, phases, spectra
@@ -26,24 +25,20 @@ _CHIP_PX, PHASES_REACH_PX, _MOST_ALONG = 64, 64, 7
 _SIDE_PX = _CHIP_PX + 2 * PHASES_REACH_PX
 
 
-def survey_unexplained(
-    pair: ImagePair, images: Resampled, elsewhere_px: float, context: Context
-) -> Survey:
+def survey_unexplained(images: Resampled, elsewhere_px: float, context: Context) -> Survey:
     """Correlate what the reference does not explain of the input with the reference, all over.
 
     Parameters
     ----------
-    pair
-        The images.
     images
-        The same, resampled by what was found, with `PHASES_REACH_PX` around them.
+        A pair's, resampled by what was found, with `PHASES_REACH_PX` around them.
     elsewhere_px
         See `Survey`.
     context
         Threads.
     """
     places = Places.spread(
-        pair.grid, _CHIP_PX, lambda side: np.clip(side // _CHIP_PX, 1, _MOST_ALONG)
+        images.pair.grid, _CHIP_PX, lambda side: np.clip(side // _CHIP_PX, 1, _MOST_ALONG)
     )
     windows = ChipWindows(images, places, PHASES_REACH_PX, None, unexplained)
     _, found = windows.map(_surfaces, context)

@@ -116,7 +116,7 @@ def survey_all(
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, images, part)
-        unexplained = survey_unexplained(pair, images, elsewhere_px, context.quiet())
+        unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground, images)
