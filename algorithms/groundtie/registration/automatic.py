@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from ..context import Context, threads
 from ..errors import GeoreferencingError, ParameterError
@@ -101,24 +101,9 @@ def plan_rendered(given: Mapping[str, Any]) -> Iterator[Try]:
         yield Try("coregister", replace(COREGISTER, light=light), because)
 
 
-@dataclass(frozen=True)
-class OrthorectifiedRpc(RefinedRpc):
-    """An image with RPCs, orthorectified by RPCs that were refined on the reference."""
-
-    chosen: ClassVar = "refine_rpc: the input has RPCs"
-
-    def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
-        return {**super().summary(), "tried": [self.chosen]}
-
-    def lines(self) -> list[str]:
-        """Return the result as lines of text."""
-        return [self.chosen, *super().lines()]
-
-
 def register_anything(
     parameters: Mapping[str, Any], progress: Progress
-) -> Registration | OrthorectifiedRpc:
+) -> Registration | RefinedRpc:
     """Register as the tool `register` does, from its parameters by name.
 
     Raises
@@ -182,7 +167,7 @@ def _needs_rpcs(raster: Any) -> bool:
         return True
 
 
-def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> OrthorectifiedRpc:
+def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     """Refine the RPCs of the input on the reference, and orthorectify it."""
     given = {**USUAL, **_RPC_DEFAULTS, **parameters}
     for name in ("input_dem", "views"):
@@ -206,7 +191,8 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> Orthorectifie
         # The RPCs themselves are not written.
         "output": None,
     }
-    return OrthorectifiedRpc(**vars(refine_into(files, given, progress)))
+    refined = refine_into(files, given, progress)
+    return replace(refined, tried=("refine_rpc: the input has RPCs",))
 
 
 def _orthorectifier(ground: Ground, workers: int | None) -> WriteOutput:

@@ -171,6 +171,8 @@ class RefinedRpc:
         Which mask points were matched with; None: they were given.
     files
         What was written, by name.
+    tried
+        Why RPCs were refined, where the images decided it, a line each.
     """
 
     path: str
@@ -183,6 +185,7 @@ class RefinedRpc:
     heights: HeightCheck
     mask: MaskUsed | None
     files: Mapping[str, str] = field(default_factory=dict)
+    tried: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -280,6 +283,7 @@ class RefinedRpc:
             "heights": {"used": self.ground, **self.heights.summary()},
             "mask": None if self.mask is None else self.mask.summary(),
             "files": self.files,
+            **({"tried": list(self.tried)} if self.tried else {}),
         }
 
     def lines(self) -> list[str]:
@@ -288,6 +292,7 @@ class RefinedRpc:
         shift, sigma = bias.shift_px()
         by_hand = self.points.by_hand
         return [
+            *self.tried,
             f"accepted: {verdict.reason}",
             f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "

@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..declaration import NO_VALUES, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
 from ..progress import SILENT, Progress
-from ..registration.automatic import OrthorectifiedRpc, register_anything
+from ..registration.automatic import register_anything
+from ..registration.refinement import RefinedRpc
 from ..registration.registration import Registration
 from .parameters import general, registration, sensor
 
@@ -32,7 +33,7 @@ def register(
     workers: general.Workers = None,
     progress: Progress = SILENT,
     parameters: Values = NO_VALUES,
-) -> Registration | OrthorectifiedRpc:
+) -> Registration | RefinedRpc:
     """Register an image to another one of the same place; the images decide how.
 
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
