@@ -14,8 +14,8 @@ from .dependencies import complaint, missing_packages, rasterio_env
 from .library import plugin_metadata
 from .shipped_models import load_models
 from .styling import ICON
-from .tool_loading import LazyTool, all_tools
-from .unavailable import UnavailableAlgorithm, broken, named_tools
+from .tool_loading import all_tools, named_tools
+from .unavailable import UnavailableAlgorithm, broken
 
 # The endings, without dot, that outputs of the tools may have, the usual one first: to ask the
 # tools would import them all.
@@ -33,7 +33,7 @@ def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
     if missing := complaint(missing_packages()):
         return (), missing
     if qgis.utils.iface is not None:
-        return tuple(LazyTool(**vars(tool)) for tool in named_tools()), ""
+        return named_tools(), ""
     try:
         with rasterio_env():
             return all_tools(), ""
@@ -76,7 +76,7 @@ class GroundTieProvider(QgsProcessingProvider):
             QgsMessageLog.logMessage(self._missing, "GroundTie", WARNING)
             for named in named_tools():
                 if named.name == DOCTOR:
-                    self.addAlgorithm(ToolAlgorithm(LazyTool(**vars(named))))
+                    self.addAlgorithm(ToolAlgorithm(named))
                 else:
                     self.addAlgorithm(UnavailableAlgorithm(named, self._missing))
 

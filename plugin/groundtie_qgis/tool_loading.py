@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from functools import cache
 from typing import Any
 
 from .dependencies import rasterio_env
@@ -38,6 +39,13 @@ class LazyTool:
 
     def __getattr__(self, attribute: str) -> Any:
         return getattr(_tool(self.name), attribute)
+
+
+@cache
+def named_tools() -> tuple[LazyTool, ...]:
+    """Return all tools by what a list shows of them; none of them is imported for it."""
+    tools = library_module("tools")
+    return tuple(LazyTool(**vars(tools.named_tool(name))) for name in tools.NAMES)
 
 
 _TOOLS: dict[str, Any] = {}

@@ -1,8 +1,7 @@
-"""What is shown of a tool without importing it, and what stands in for one that lacks packages."""
+"""What the toolbox shows of a tool, and what stands in for one that lacks packages."""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 from qgis.core import (
@@ -13,17 +12,9 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
-from .library import library_module
 from .pages import help_url
 from .styling import icon_of
 from .translation import tr
-
-
-@cache
-def named_tools() -> list[Any]:
-    """Return name, title, group and summary of the tools; none of them is imported for it."""
-    tools = library_module("tools")
-    return [tools.named_tool(name) for name in tools.NAMES]
 
 
 def broken(error: ImportError) -> str:

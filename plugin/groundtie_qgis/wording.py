@@ -6,8 +6,8 @@ import re
 from typing import Any
 
 from .choice_labels import label_of
+from .tool_loading import named_tools
 from .translation import tr
-from .unavailable import named_tools
 
 
 def choice_label(word: str) -> str:
