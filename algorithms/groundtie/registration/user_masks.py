@@ -18,14 +18,14 @@ from ..features.classifier import read_classifier
 from ..masks.beside import mask_beside
 from ..masks.layer import read_layer
 from ..masks.regions import WIDTH_M
-from ..masks.scene import Scene, Select, write_mask
+from ..masks.scene import Scene, Select, Selection, write_mask
 from ..masks.used import INPUT, LAYER, NONE, REFERENCE, MaskUsed
 from ..masks.values import INSIDE, RasterMask, mask_values
 from ..progress import Progress
 from ..raster_names import file_name, raster_name
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image, ImagePair
-from ..rasters.reading import RasterSource, open_raster
+from ..rasters.reading import RasterSource, Window, open_raster
 from .scene import located, scene_of
 
 _CLASSIFIER_SUFFIX = ".json"
@@ -230,3 +230,37 @@ def drawn_mask(
     path = stack.enter_context(scratch_folder()) / "mask.tif"
     share = write_mask(scene, path, select, progress)
     return stack.enter_context(open_raster(path)), share
+
+
+def draw_mask(source: RasterSource, mask: UserMask, stack: ExitStack, progress: Progress) -> Image:
+    """Return an image with a mask on its own pixels, so that it moves with these.
+
+    Parameters
+    ----------
+    source
+        The image.
+    mask
+        Its mask; `UserMask.is_drawn` states which are drawn.
+    stack
+        Keeps the drawn mask until it is closed.
+    progress
+        Receives every tile.
+    """
+    scene = Scene.of(source)
+    with ExitStack() as own:
+        draw = _select_zeros if mask.is_zeros else select_drawn
+        raster, share = drawn_mask(scene, draw(scene, mask, own), stack, progress)
+    return mask.noted(replace(Image(source), mask=raster), share, source.path)
+
+
+def _select_zeros(scene: Scene, mask: UserMask, stack: ExitStack) -> Select:
+    """Return what selects the pixels of an image that a raster keeps, by its zeros."""
+    grid = scene.grid
+    image = Image(scene.like).masked(stack.enter_context(open_raster(mask.mask)), grid)
+
+    def select(window: Window) -> Selection:
+        valid = scene.read(window).valid
+        shown = image.shown_on(grid.window(*window), grid.map_to_pixel)
+        return Selection(valid & shown, valid)
+
+    return select

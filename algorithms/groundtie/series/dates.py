@@ -26,11 +26,10 @@ from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import RasterSource, open_raster
-from ..registration.user_masks import UserMask
+from ..registration.user_masks import UserMask, draw_mask
 from ..report.pictures import overview_grid
 from ..runs import digest, file_facts, unknown_facts
 from ..vrt_sources import sources_of
-from .date_masks import draw_mask
 from .inputs import Listed
 
 # Footprints are drawn on images reduced to this, on their longer side.
