@@ -51,10 +51,10 @@ def test_files_of_an_accepted_registration(
     np.testing.assert_array_equal(
         load_transform(tmp_path / "t.json")(points.reference_xy), transform(points.reference_xy)
     )
-    assert set(files.named(registration)) == {"tie_points", "transform", "report"}
-    assert RegistrationFiles().named(registration) == {}
+    assert set(files.named()) == {"tie_points", "transform", "report"}
+    assert RegistrationFiles().named() == {}
     output = RegisteredOutput(tmp_path / "o.tif", "reference", "cubic")
-    assert RegistrationFiles(output).named(registration) == {"output": tmp_path / "o.tif"}
+    assert RegistrationFiles(output).named() == {"output": tmp_path / "o.tif"}
 
 
 def test_a_refused_registration_writes_its_report_and_raises(
@@ -69,7 +69,6 @@ def test_a_refused_registration_writes_its_report_and_raises(
     assert error.value.verdict is LOST
     assert LOST.advice in str(error.value)
     assert set(listing(tmp_path)) == {"r.html", "r.json"}
-    assert call.files.named(lost) == {"report": tmp_path / "r.html"}
     numbers = json.loads((tmp_path / "r.json").read_text())
     assert numbers["verdict"]["accepted"] is False
     assert numbers["verdict"]["rule"] == "nothing in common"

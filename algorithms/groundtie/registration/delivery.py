@@ -35,15 +35,15 @@ class RegistrationFiles:
     report: Path | None = None
     displacement: Path | None = None
 
-    def named(self, registration: Registration) -> dict[str, Path]:
-        """Return what `write` writes of a registration, by name."""
-        results = {
+    def named(self) -> dict[str, Path]:
+        """Return what `write` writes of an accepted registration, by name."""
+        named = {
             "output": None if self.output is None else self.output.path,
             "tie_points": self.tie_points,
             "transform": self.transform,
             "displacement": self.displacement,
+            "report": self.report,
         }
-        named = {**(results if registration.verdict.accepted else {}), "report": self.report}
         return {name: path for name, path in named.items() if path is not None}
 
     def beyond(self, registration: Registration) -> BeyondOverlap | None:
@@ -201,7 +201,7 @@ class Call:
             self.files.write(registration, context)
             registration.require_accepted()
             rasters = stack.pop_all()
-        kept = replace(registration, files=self.files.named(registration), rasters=rasters)
+        kept = replace(registration, files=self.files.named(), rasters=rasters)
         weakref.finalize(kept, rasters.close)
         return kept
 
