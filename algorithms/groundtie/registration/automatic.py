@@ -29,7 +29,7 @@ from .refinement_output import RefinementFiles, WriteOutput
 from .registration import Registration
 from .scene import SceneInfo
 from .sensor_input import Ground, OrientedImage
-from .sensor_jobs import refine_into
+from .sensor_jobs import refine
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 
 # Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
@@ -191,7 +191,7 @@ def _by_rpcs(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
         # The RPCs themselves are not written.
         "output": None,
     }
-    refined = refine_into(files, given, progress)
+    refined = refine(given, progress, files)
     return replace(refined, tried=("refine_rpc: the input has RPCs",))
 
 

@@ -94,8 +94,12 @@ def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpRes
     return GcpResult(points, registration.verdict, registration.mask, output, sensor.heights)
 
 
-def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
+def refine(
+    parameters: Mapping[str, Any], progress: Progress, files: RefinementFiles | None = None
+) -> RefinedRpc:
     """Refine RPCs as the tool `refine_rpc` does, from its parameters by name.
+
+    Other files than those of the parameters may be written.
 
     Raises
     ------
@@ -104,16 +108,9 @@ def refine(parameters: Mapping[str, Any], progress: Progress) -> RefinedRpc:
     NotRegisteredError
         The ground control or the refined RPCs are refused; the report is written.
     """
-    files = RefinementFiles(
+    files = files or RefinementFiles(
         parameters["output"], parameters["residuals"], parameters["report"], parameters
     )
-    return refine_into(files, parameters, progress)
-
-
-def refine_into(
-    files: RefinementFiles, parameters: Mapping[str, Any], progress: Progress
-) -> RefinedRpc:
-    """Refine RPCs as `refine`, and write files that need not be those of the parameters."""
     gcps = parameters["gcps"]
     if (parameters["reference"] is None) == (gcps is None):
         raise ParameterError("give either a reference or ground control points (gcps)")
