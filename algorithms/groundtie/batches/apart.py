@@ -43,7 +43,12 @@ def check_apart(tool: Tool, calls: Sequence[Call], table: Path, results: Sequenc
                 both = f"rows {other} and" if other else "the batch and row"
                 raise SameFileError(f"{both} {call.row} both write {path}")
     _check_read(writers.get(table.resolve()), "the batch", table)
-    folders = {path.resolve(): call.row for call in calls for path in _folders(tool, call)}
+    folders = {
+        path.resolve(): call.row
+        for call in calls
+        for name, path in call.outputs.items()
+        if isinstance(tool.parameter(name).kind, FolderOut)
+    }
     for call in calls:
         for path in _read(tool, call):
             place = path.resolve()
@@ -74,13 +79,6 @@ def _check_read(writer: int | None, reader: str, path: Path) -> None:
 
 def _name(row: int) -> str:
     return f"row {row}" if row != _BATCH else "the batch"
-
-
-def _folders(tool: Tool, call: Call) -> Iterator[Path]:
-    """Yield the folders that a call writes into."""
-    for name, path in call.outputs.items():
-        if isinstance(tool.parameter(name).kind, FolderOut):
-            yield path
 
 
 def _read(tool: Tool, call: Call) -> Iterator[Path]:
