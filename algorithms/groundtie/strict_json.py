@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,25 @@ def read_json(path: Path, *, keeps_digits: bool = False) -> Any:
         As `parse_json`.
     """
     return parse_json(path.read_bytes(), keeps_digits=keeps_digits)
+
+
+def read_json_lines(path: Path, *, keeps_digits: bool = False) -> Iterator[Any]:
+    """Yield what each line of a file states.
+
+    Of lines that are no JSON, as the last one of a program that was killed, nothing is taken; a
+    file that cannot be read has no lines.
+
+    Parameters
+    ----------
+    path
+        The file.
+    keeps_digits
+        As `parse_json`.
+    """
+    with suppress(OSError), path.open("rb") as file:
+        for line in file:
+            with suppress(ValueError):
+                yield parse_json(line, keeps_digits=keeps_digits)
 
 
 def parse_json(content: bytes, *, keeps_digits: bool = False) -> Any:

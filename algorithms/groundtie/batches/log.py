@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..rasters.atomic import writing
+from ..strict_json import read_json_lines
 from .calls import Call
 from .work import DONE, REFUSED, Outcome, files_of
 
@@ -67,16 +68,11 @@ def open_log(path: Path, append: bool) -> Iterator[EventLog]:
 def read_finished(path: Path) -> dict[str, Outcome]:
     """Return the outcomes of rows that need not run again, by their calls' keys.
 
-    Of lines that are no event, as the last one of a batch that was killed, nothing is taken.
+    Of lines that are no event nothing is taken.
     """
     finished = {}
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return {}
-    for line in lines:
+    for event in read_json_lines(path, keeps_digits=True):
         with contextlib.suppress(ValueError, TypeError, KeyError, AttributeError):
-            event = json.loads(line)
             if event["event"] == ROW and event["status"] in (DONE, REFUSED):
                 finished[event["key"]] = _outcome(event)
     return finished

@@ -21,7 +21,7 @@ from ..rasters.atomic import make_folder, writing
 from ..rasters.hidden_files import remove
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG, digest, file_state
-from ..strict_json import parse_json, read_json
+from ..strict_json import read_json, read_json_lines
 from .frame import SeriesFrame
 from .pairs import PairResult
 
@@ -177,10 +177,8 @@ def _read_unfinished(path: Path) -> StoredSeries:
     """Return the registrations of runs that did not end; of lines that are none, nothing."""
     frames: dict[str | None, SeriesFrame] = {}
     pairs: dict[str, PairResult] = {}
-    lines = path.read_bytes().splitlines() if path.exists() else []
-    for line in lines:
+    for values in read_json_lines(path):
         with contextlib.suppress(GroundTieError, KeyError, TypeError, ValueError, CRSError):
-            values = parse_json(line)
             pair = PairResult.from_json(values["pair"])
             frames[values["reference_key"]] = SeriesFrame.from_json(values["frame"])
             pairs[pair.key] = pair
