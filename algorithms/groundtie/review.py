@@ -268,7 +268,7 @@ def refine_click(
         grid = one.grid if factor < 1.01 else one.grid.scaled(factor)
         side = _CHIP_PX + 2 * (_CLICK_PX + BORDER_PX) + 1
         here = grid.map_to_pixel(xy).ravel()
-        # A lattice of the reference's pixels whose middle is the clicked place.
+        # A grid of the reference's pixels whose middle is the clicked place.
         corner = Affine.translation(*(here + 0.5 - side / 2))
         around = grid.on_same_map(compose(grid.transform, corner), side, side)
         middle = (side - 1) / 2

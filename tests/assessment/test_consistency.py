@@ -117,7 +117,7 @@ class TestTwoWay:
 
     def test_a_flexible_way_back_is_followed_everywhere(self) -> None:
         """A bulge of 15 m in a thin-plate spline shows at its place, and only there."""
-        xy = A.pixel_to_map(A.lattice())
+        xy = A.pixel_to_map(A.places())
         centre = A.pixel_to_map([[60.0, 60.0]])[0]
         bulge = 15 * np.exp(-((xy - centre) ** 2).sum(axis=1) / 300**2)
         nominal = xy + np.column_stack([bulge, 0 * bulge])

@@ -89,7 +89,7 @@ def test_the_middle_of_each_cell_is_held_out() -> None:
     middle = np.minimum(np.abs(px - 29.5), np.abs(px - 79.5))
     np.testing.assert_array_equal(axis.held_out(px), middle < block / 2)
     np.testing.assert_array_equal(axis.held_out(px, 3.2), middle < block / 2 + 3.2)
-    np.testing.assert_allclose(axis.lattice(2), [4.5, 29.5, 54.5, 79.5, 104.5])
+    np.testing.assert_allclose(axis.divided(2), [4.5, 29.5, 54.5, 79.5, 104.5])
     # Two chips that fit into a block lie a pixel from its borders; a larger one in its middle.
     half = (block - 10) / 2 - 1
     expected = [29.5 - half, 29.5 + half, 79.5 - half, 79.5 + half]

@@ -236,13 +236,13 @@ class TestAcrossTheAntimeridian:
     @pytest.mark.parametrize("turn", [0.0, -360.0])
     def test_longitudes_go_on_as_the_grids_do(self, turn: float) -> None:
         grid = self.GRID.shifted(turn, 0)
-        px = grid.lattice()
+        px = grid.places()
         xy = reproject(grid.pixel_to_map(px), WGS84, self.UTM60)
         np.testing.assert_allclose(self.ZONE.to_pixels_of(grid)(xy), px, atol=1e-3)
 
     def test_between_maps_of_other_longitudes(self) -> None:
         west = self.GRID.shifted(-360.0, 0)
-        px = west.lattice()
+        px = west.places()
         found = west.to_pixels_of(self.GRID)(west.pixel_to_map(px))
         np.testing.assert_allclose(found, px, atol=1e-4)
 

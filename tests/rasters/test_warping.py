@@ -317,7 +317,7 @@ def test_the_whole_earth_is_found_however_longitudes_are_counted(
         for west in (own, other)
     )
     image, expected = (
-        (each.pixel_to_map(each.lattice(1))[0, 0] + 0.5 * np.arange(720) + 180) % 360
+        (each.pixel_to_map(each.places(1))[0, 0] + 0.5 * np.arange(720) + 180) % 360
         for each in (grid, onto)
     )
     path = write_raster(tmp_path / "a.tif", np.tile(image.astype(np.float32), (360, 1)), grid)

@@ -11,7 +11,7 @@ from rpc_models import camera_rpc, relief, write_dem, write_positions
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.height_check import HeightCheck, check_heights
 from groundtie.sensor.orientation import orient
-from groundtie.sensor.rpc import RPC, image_lattice
+from groundtie.sensor.rpc import RPC, image_places
 from groundtie.sensor.rpc_fit import fit_rpc
 
 SIZE = (600, 500)
@@ -21,8 +21,8 @@ UTM = CRS.from_epsg(32632)
 def narrow() -> RPC:
     """Return RPCs that were made for the relief's heights alone, as suppliers make them."""
     rpc = camera_rpc()
-    ground = relief(rpc.localise(*image_lattice(SIZE, [300.0])))
-    px, height = image_lattice(SIZE, np.linspace(ground.min(), ground.max(), 5))
+    ground = relief(rpc.localise(*image_places(SIZE, [300.0])))
+    px, height = image_places(SIZE, np.linspace(ground.min(), ground.max(), 5))
     lon_lat = rpc.localise(px, height)
     return fit_rpc(lon_lat, height, rpc.project(lon_lat, height)).rpc
 

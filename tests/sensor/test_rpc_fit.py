@@ -7,7 +7,7 @@ import pytest
 from rpc_models import DIMAP, REAL, camera, real_tags
 
 from groundtie.errors import TooFewPointsError
-from groundtie.sensor.rpc import image_lattice
+from groundtie.sensor.rpc import image_places
 from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_fit import fit_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags
@@ -36,7 +36,7 @@ def test_an_affine_change_of_real_rpcs_is_taken_up(real_data: Path, name: str) -
     path, size = real_data / name, (1024, 1024)
     rpc = read_rpc(path) if name == DIMAP else rpc_from_tags(real_tags(path), name)
     heights = np.linspace(rpc.offset[2] - rpc.scale[2], rpc.offset[2] + rpc.scale[2], 5)
-    px, height = image_lattice(size, heights)
+    px, height = image_places(size, heights)
     lon_lat = rpc.localise(px, height)
     fit = fit_rpc(lon_lat, height, rpc.project(lon_lat, height) @ AFFINE.T + [12.0, -7.0])
     px = np.random.default_rng(0).uniform(0, 1024, (500, 2))
@@ -47,7 +47,7 @@ def test_an_affine_change_of_real_rpcs_is_taken_up(real_data: Path, name: str) -
 
 
 def test_the_lattice_reaches_to_the_images_corners() -> None:
-    px, heights = image_lattice((600, 500), [0.0, 400.0], nodes=3)
+    px, heights = image_places((600, 500), [0.0, 400.0], nodes=3)
     assert sorted(set(px[:, 0])) == [-0.5, 299.5, 599.5]
     assert sorted(set(px[:, 1])) == [-0.5, 249.5, 499.5]
     assert set(heights) == {0.0, 400.0}

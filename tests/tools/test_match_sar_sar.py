@@ -114,7 +114,7 @@ def test_ground_between_forests_is_matched_where_the_whole_is_refused(tmp_path: 
     found = match_sar_sar(*forest_files(tmp_path, 0.3, 1), tmp_path / "out.tif")
     assert (found.mask.kind, found.mask.image, found.spec.tries) == (OPEN, "reference", 2)
     grid = utm_grid(420, 420, 1.0)
-    px = grid.lattice()
+    px = grid.places()
     error = np.hypot(*(found.transform(grid.pixel_to_map(px)) - px).T)
     assert np.sqrt(np.mean(error**2)) < 1.0
 

@@ -86,7 +86,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
     Returns
     -------
     PointErrors
-        On a lattice of pixels over the input, where all images overlap.
+        At pixels all over the input, where all images overlap.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What of an image a classifier lets take part, decided on a lattice of its pixels."""
+"""What of an image a classifier lets take part, decided at every so many of its pixels."""
 
 from __future__ import annotations
 

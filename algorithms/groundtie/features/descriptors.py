@@ -1,6 +1,6 @@
 """SIFT's descriptor on any gradient: what is around a keypoint, as 128 numbers.
 
-Gradients around a keypoint are sampled on a lattice that rotates and grows with it, so where a
+Gradients around a keypoint are sampled at places that rotate and grow with it, so where a
 sample lies in the descriptor is the same for all keypoints: its share in the 4 × 4 cells is one
 constant matrix, and all keypoints are described by one product. [Lowe2004]; [Suri2010] appendix.
 """
@@ -17,7 +17,7 @@ from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from .keypoints import Keypoints
-from .sampling import sampled_gradient, square_lattice, unit_rows
+from .sampling import sampled_gradient, square_samples, unit_rows
 from .scale_space import Gradient, gradients_at_scales
 
 # Cells a side, and directions of each ([Lowe2004] 6.1).
@@ -65,21 +65,21 @@ class SiftDescriptor:
 
 @cache
 def _cell_weights() -> tuple[FloatArray, FloatImage]:
-    """Return the descriptor's lattice in scales, and each sample's share in the cells, (16, m)."""
+    """Return the places of samples in scales, and each sample's share in the cells, (16, m)."""
     # Cells share their samples with their neighbours, so samples reach half a cell further.
     half = (CELLS + 1) / 2
-    lattice = square_lattice(half, _SAMPLES * (CELLS + 1))
+    samples = square_samples(half, _SAMPLES * (CELLS + 1))
     centres = np.arange(CELLS) - (CELLS - 1) / 2
-    x, y = (np.maximum(1 - np.abs(lattice[:, axis] - centres[:, None]), 0) for axis in (0, 1))
-    window = np.exp(-(lattice**2).sum(axis=1) / (2 * _WINDOW_CELLS**2))
+    x, y = (np.maximum(1 - np.abs(samples[:, axis] - centres[:, None]), 0) for axis in (0, 1))
+    window = np.exp(-(samples**2).sum(axis=1) / (2 * _WINDOW_CELLS**2))
     weights = (y[:, None] * x[None] * window).reshape(CELLS * CELLS, -1)
-    return lattice * _CELL_SCALES, weights.astype(np.float32)
+    return samples * _CELL_SCALES, weights.astype(np.float32)
 
 
 def sift_rows(fields: Gradient, points: Keypoints) -> FloatImage:
     """Return the descriptors of keypoints in pixels of a gradient, shape (n, 128)."""
-    lattice, weights = _cell_weights()
-    strength, direction = sampled_gradient(fields, points, lattice)
+    samples, weights = _cell_weights()
+    strength, direction = sampled_gradient(fields, points, samples)
     place = direction * np.float32(DIRECTIONS / (2 * np.pi))
     below = np.floor(place)
     share = place - below

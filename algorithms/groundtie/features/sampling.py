@@ -1,4 +1,4 @@
-"""Gradients sampled on lattices that rotate and grow with keypoints."""
+"""Gradients sampled at places that rotate and grow with keypoints."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from .keypoints import Keypoints
 from .scale_space import Gradient
 
 
-def square_lattice(half: float, count: int) -> FloatArray:
-    """Return a lattice of count² positions (x, y) in the middle of the squares of ± half."""
+def square_samples(half: float, count: int) -> FloatArray:
+    """Return count² positions (x, y) in the middle of the squares of ± half."""
     side = (np.arange(count) + 0.5) * (2 * half / count) - half
     return mesh(side, side)
 
 
-def lattice_around(points: Keypoints, lattice: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return columns and rows, shape (n, m) each, of a lattice around each of n keypoints.
+def samples_around(points: Keypoints, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return columns and rows, shape (n, m) each, of samples around each of n keypoints.
 
-    The lattice, shape (m, 2), is in scales of a keypoint, along and across its orientation.
+    Positions of samples, shape (m, 2), are in scales of a keypoint, along and across its
+    orientation.
     """
     cosine, sine = np.cos(points.orientation_rad)[:, None], np.sin(points.orientation_rad)[:, None]
     scale = points.scale_px[:, None]
-    x = points.position_px[:, :1] + scale * (cosine * lattice[:, 0] - sine * lattice[:, 1])
-    y = points.position_px[:, 1:] + scale * (sine * lattice[:, 0] + cosine * lattice[:, 1])
+    x = points.position_px[:, :1] + scale * (cosine * samples[:, 0] - sine * samples[:, 1])
+    y = points.position_px[:, 1:] + scale * (sine * samples[:, 0] + cosine * samples[:, 1])
     return x, y
 
 
 def sampled_gradient(
-    fields: Gradient, points: Keypoints, lattice: FloatArray
+    fields: Gradient, points: Keypoints, samples: FloatArray
 ) -> tuple[FloatImage, FloatImage]:
-    """Return strength and direction of the gradient on a lattice around each keypoint.
+    """Return strength and direction of the gradient at samples around each keypoint.
 
     Parameters
     ----------
@@ -40,14 +41,14 @@ def sampled_gradient(
         The gradient, two arrays of shape (h, w).
     points
         n keypoints, in pixels of the fields.
-    lattice
-        In scales of a keypoint, along and across its orientation, shape (m, 2).
+    samples
+        Positions in scales of a keypoint, along and across its orientation, shape (m, 2).
 
     Returns
     -------
     Strength and direction against the keypoint's orientation, shape (n, m) each.
     """
-    x, y = lattice_around(points, lattice)
+    x, y = samples_around(points, samples)
     at = np.asarray(x, np.float32), np.asarray(y, np.float32)
     gx, gy = (
         cv2.remap(f, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)

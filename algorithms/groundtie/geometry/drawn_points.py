@@ -88,13 +88,13 @@ def follow_lines(
     elsewhere = np.isfinite(columns(rows, *INPUT)) | np.isfinite(columns(rows, *PIXEL))
     moved[:, 0] &= np.isfinite(stated[:, 0]).all(1) | ~elsewhere.all(1)
     on_map = _projected(ends, layer_crs, crs)
-    is_lattice = not input_grid.is_georeferenced and _is_lattice(rows, stated[:, 0])
-    if moved[:, 0].any() and not input_grid.is_georeferenced and not is_lattice:
+    are_pixels = not input_grid.is_georeferenced and _are_pixels(rows, stated[:, 0])
+    if moved[:, 0].any() and not input_grid.is_georeferenced and not are_pixels:
         raise ValueError(
             "the start of a line was moved or drawn, which has no place in an image without "
             "georeferencing: fill input_col and input_row"
         )
-    nominal = PIXEL if is_lattice else NOMINAL
+    nominal = PIXEL if are_pixels else NOMINAL
     found = [dict(row) for row in rows]
     for end, names in enumerate((nominal, REFERENCE)):
         for index in np.flatnonzero(moved[:, end]):
@@ -102,7 +102,7 @@ def follow_lines(
     return found, np.asarray(moved.any(axis=1))
 
 
-def _is_lattice(rows: list[Row], nominal: FloatArray) -> bool:
+def _are_pixels(rows: list[Row], nominal: FloatArray) -> bool:
     """Whether the nominal positions of a table are pixels of the input."""
     stated = np.isfinite(nominal).all(1)
     px = columns(rows, *PIXEL)

@@ -135,9 +135,9 @@ class Model(ABC):
         return np.where(miss[:, None] <= _LARGEST_MISS, self.frame.leave(uv), np.nan)
 
     def on_map(self, affine: Affine) -> Self:
-        """Return this model of lattice positions as one of map positions.
+        """Return this model of pixel positions as one of map positions.
 
-        `affine` takes the lattice to the map.
+        `affine` takes the pixels to the map.
         """
         return replace(self, frame=Frame(compose(affine, self.frame.to_map)))
 

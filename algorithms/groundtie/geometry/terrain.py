@@ -80,7 +80,7 @@ class Terrain:
         return cls(_surface(dem, crs, region), assumed, region)
 
     def seen_from(self, affine: Affine) -> Terrain:
-        """Return this terrain for positions on a lattice that `affine` takes to what was asked."""
+        """Return this terrain for pixel positions that `affine` takes to what was asked."""
         return replace(self, plane=compose(self.plane, affine))
 
     def ground_m(self, xy: FloatArray) -> FloatArray:
@@ -101,7 +101,7 @@ class Terrain:
         NoOverlapError
             Heights are unknown at a part of it.
         """
-        xy = grid.pixel_to_map(grid.lattice(_ASKED))
+        xy = grid.pixel_to_map(grid.places(_ASKED))
         xy = xy[within.covers(within.to_own_map(xy, crs))]
         for surface in (self.ground, self.assumed):
             if surface is None:

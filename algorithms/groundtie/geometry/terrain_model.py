@@ -92,7 +92,7 @@ class TerrainModel(Model):
         return seen(_settled(lambda rise: terrain.ground_m(seen(rise)) - assumed, len(uv)))
 
     def on_map(self, affine: Affine) -> TerrainModel:
-        """Return this model of lattice positions as one of map positions."""
+        """Return this model of pixel positions as one of map positions."""
         return replace(super().on_map(affine), terrain=self.terrain.seen_from(~affine))
 
     def to_json(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ class HeldOut:
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
         """Return which pixels of a grid, of any pixel size, see a part of held-out blocks, (h, w).
 
-        Mostly it is a part of the matching grid's own lattice or of a coarser one along its axes,
+        Mostly it is a part of the matching grid itself or of a coarser one along its axes,
         of which whole columns and rows are asked for; pixels of others are asked for one by one.
         """
         cols, rows = np.arange(piece.width, dtype=float), np.arange(piece.height, dtype=float)

@@ -76,7 +76,7 @@ class Axis:
         half = _HELD_OUT / 2 + reach_px / self.pitch - 1e-9
         return np.asarray(inside & (np.abs(phase - 0.5) < half))
 
-    def lattice(self, parts: int) -> NDArray[np.float64]:
+    def divided(self, parts: int) -> NDArray[np.float64]:
         """Return positions that divide each cell into so many parts, lines included."""
         return np.asarray(self.first + np.arange(self.cells * parts + 1) * self.pitch / parts)
 
@@ -126,7 +126,7 @@ class ChipLayout:
     @cached_property
     def fit_centres(self) -> NDArray[np.int_]:
         """Centres (col, row) of the chips of the fit, shape (n, 2)."""
-        cols, rows = self.columns.lattice(self.parts), self.rows.lattice(self.parts)
+        cols, rows = self.columns.divided(self.parts), self.rows.divided(self.parts)
         on_line_col = np.arange(len(cols)) % self.parts == 0
         on_line_row = np.arange(len(rows)) % self.parts == 0
         on_line = on_line_row[:, None] | on_line_col[None, :]

@@ -175,7 +175,7 @@ def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFuncti
     The latter at most, in pixels.
     """
     grid, reference = pair.grid, pair.reference.source.grid
-    xy = grid.pixel_to_map(grid.lattice())
+    xy = grid.pixel_to_map(grid.places())
     found, there = transform(xy), reference.map_to_pixel(xy)
     offset = np.rint(np.median(found - there, axis=0))
     off_px = float(np.abs(found - there - offset).max())
@@ -184,5 +184,5 @@ def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFuncti
 
 def _off_nominal_px(grid: Grid, transform: Transform) -> float:
     """Return how far at most a transform is from what is nominal, in pixels of a grid."""
-    px = grid.lattice()
+    px = grid.places()
     return float(np.abs(grid.map_to_pixel(transform.model(grid.pixel_to_map(px))) - px).max())

@@ -67,7 +67,7 @@ PIXEL_COORDINATES = Affine.translation(-0.5, -0.5)
 
 @dataclass(frozen=True)
 class Grid:
-    """A lattice of pixels on the map.
+    """Pixels on the map.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ class Grid:
     width, height
         Size in pixels.
     is_on_pixels
-        Whether the map is the pixels of a raster without georeferencing, of which this is another
-        lattice than its own.
+        Whether the map is the pixels of a raster without georeferencing, of which these are
+        others than its own.
     """
 
     transform: Affine
@@ -199,7 +199,7 @@ class Grid:
         return self.on_same_map(compose(self.transform, Affine.scale(factor)), width, height)
 
     def window(self, col: int, row: int, width: int, height: int) -> Grid:
-        """Return the part of this lattice that starts at a pixel; it may reach beyond the grid."""
+        """Return a part of this grid that starts at a pixel; it may reach beyond its borders."""
         place = compose(self.transform, Affine.translation(col, row))
         return self.on_same_map(place, width, height)
 
@@ -209,7 +209,7 @@ class Grid:
         return self.on_same_map(place, *self.size)
 
     def on_same_map(self, transform: Affine, width: int, height: int) -> Grid:
-        """Return another lattice on the map of this one."""
+        """Return other pixels on the map of these."""
         return Grid(transform, self.crs, width, height, is_on_pixels=not self.is_georeferenced)
 
     def on_own_pixels(self) -> Grid:
@@ -248,7 +248,7 @@ class Grid:
             raise ValueError("the grid is none of a raster")
         return Grid(transform, crs_from_text(values["crs"]), width, height)
 
-    def lattice(self, count: int = 9) -> FloatArray:
+    def places(self, count: int = 9) -> FloatArray:
         """Return pixel positions all over the grid, `count` a side, shape (count², 2)."""
         return mesh(*(np.linspace(0, side - 1, count) for side in self.size))
 

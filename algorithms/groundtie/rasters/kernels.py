@@ -114,14 +114,14 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
         found = np.empty((len(bands), *px.shape[1:]), bands.dtype)
         for band, values in zip(bands, found, strict=True):
             cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR, dst=values)
-    elif (first := _first_of_lattice(px)) is not None and not np.iscomplexobj(image):
+    elif (first := _first_of_neighbours(px)) is not None and not np.iscomplexobj(image):
         found = _by_filter(bands, first, px.shape[1:], _KERNELS[method], REACH[method])
     else:
         found = _by_kernel(bands, px, _KERNELS[method], REACH[method])
     return np.asarray(found.reshape(*image.shape[:-2], *px.shape[1:]))
 
 
-def _first_of_lattice(px: NDArray[Any]) -> tuple[float, float] | None:
+def _first_of_neighbours(px: NDArray[Any]) -> tuple[float, float] | None:
     """Return the first of positions that lie side by side as pixels do, (col, row); None: no."""
     if px.size == 0 or np.abs(px).max() > _REMAP_SIDE:
         return None

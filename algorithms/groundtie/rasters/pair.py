@@ -156,13 +156,12 @@ class ImagePair:
     reference, input
         The two images.
     grid
-        The matching grid: the reference's lattice, with pixels as large as the coarser image's,
+        The matching grid: the reference's, with pixels as large as the coarser image's,
         where the images overlap or may do so within the search radius.
     overlap_px
         Width and height, in matching pixels, of the box in which they overlap nominally.
     surroundings
-        The matching lattice as far as either image may show something of the matching grid, at
-        its nominal place.
+        That grid, continued as far as either image may show something of it at its nominal place.
     limits
         How far the input may lie from its nominal place, in metres.
     """

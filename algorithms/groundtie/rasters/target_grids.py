@@ -27,17 +27,17 @@ from .windows import Window
 _LARGEST_STRETCH = 16.0
 
 
-def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
-    """Return the part of a lattice, continued beyond its grid, that covers a footprint.
+def covering_grid(grid: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
+    """Return the part of a grid, continued beyond its borders, that covers a footprint.
 
     Parameters
     ----------
-    lattice
+    grid
         Gives CRS, pixel size and where the pixels' borders are.
     xy
-        Map positions in the lattice's CRS, shape (n, 2); those that are not finite are left out.
+        Map positions in the grid's CRS, shape (n, 2); those that are not finite are left out.
     within
-        Cut the result to the grid of the lattice.
+        Cut the result to the grid.
 
     Raises
     ------
@@ -47,21 +47,21 @@ def covering_grid(lattice: Grid, xy: FloatArray, *, within: bool = False) -> Gri
         It would have more pixels than a raster can have, or than can be worked through.
     """
     xy = finite(xy)
-    px = lattice.map_to_pixel(xy)
+    px = grid.map_to_pixel(xy)
     if len(px) == 0:
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
     if not (np.abs(px) < MOST_PX).all() and not within:
         raise GridSizeError("the result would have more pixels a side than a raster can have")
-    low, high = _covering_px(lattice, px, within)
+    low, high = _covering_px(grid, px, within)
     if np.any(high <= low):
         raise NoOverlapError(
-            f"the footprint of the image does not lie on the grid{_turned(lattice, xy)}"
+            f"the footprint of the image does not lie on the grid{_turned(grid, xy)}"
         )
-    return require_workable(lattice.window(*Window.between(low, high)), "the result")
+    return require_workable(grid.window(*Window.between(low, high)), "the result")
 
 
 def _covering_px(
-    lattice: Grid, px: FloatArray, within: bool
+    grid: Grid, px: FloatArray, within: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the first pixel that covers positions, shape (n, 2), and the one after the last."""
     px = np.clip(px, -MOST_PX, MOST_PX)
@@ -70,16 +70,16 @@ def _covering_px(
     high = np.ceil(px.max(axis=0) + 0.5 - POSITION_ERROR_PX).astype(int)
     if not within:
         return low, high
-    return np.clip(low, 0, lattice.size), np.clip(high, 0, lattice.size)
+    return np.clip(low, 0, grid.size), np.clip(high, 0, grid.size)
 
 
-def _turned(lattice: Grid, xy: FloatArray) -> str:
+def _turned(grid: Grid, xy: FloatArray) -> str:
     """Return words on where a footprint lies that is off a grid in its own longitudes only."""
-    turn = full_turn(lattice.crs)
+    turn = full_turn(grid.crs)
     if turn is None:
         return ""
     for moved in (xy - [turn, 0], xy + [turn, 0]):
-        low, high = _covering_px(lattice, lattice.map_to_pixel(moved), within=True)
+        low, high = _covering_px(grid, grid.map_to_pixel(moved), within=True)
         if np.all(high > low):
             return (
                 ", but a full turn of longitude beside it: move the geotransform of one of them "
@@ -97,9 +97,9 @@ def registered_grid(
 ) -> Grid:
     """Return a grid for a registered raster that covers all of it.
 
-    In the input's own CRS and without another pixel size it is the input's own lattice, so that
-    the result lines up with the input's neighbours. Otherwise it is north-up, with square pixels
-    as large as the input's and pixel borders at multiples of their size.
+    In the input's own CRS and without another pixel size it is the input's own grid, continued, so
+    that the result lines up with the input's neighbours. Otherwise it is north-up, with square
+    pixels as large as the input's and pixel borders at multiples of their size.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _registered_grid(
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2
         pixel_size_m = float(np.sqrt(area * metres.prod()))
     width, height = pixel_size_m / metres
-    lattice = Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1)
-    if not is_invertible(lattice.transform):
+    pixels = Grid(Affine(width, 0, 0, 0, -height, 0), crs, 1, 1)
+    if not is_invertible(pixels.transform):
         raise GridSizeError("the transform gives the raster's pixels no size on the map")
-    return covering_grid(lattice, footprint)
+    return covering_grid(pixels, footprint)

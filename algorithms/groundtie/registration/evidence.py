@@ -258,7 +258,7 @@ class RegistrationEvidence(ImagesEvidence):
     @cached_property
     def held_out(self) -> Agreement:
         """How the check points agree; those without a peak count as disagreeing."""
-        count, places = len(self.check), self.grid.lattice()
+        count, places = len(self.check), self.grid.places()
         return Agreement.of("check points", self.error, count, "the overlap", places, self.tries)
 
     @property

@@ -146,7 +146,7 @@ def match_ground_control(
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:
     """Return by how much image positions differ from those of the RPCs, by a model on the map."""
-    xy = pair.grid.pixel_to_map(pair.grid.lattice())
+    xy = pair.grid.pixel_to_map(pair.grid.places())
     shifts = orientation.to_px(model(xy)) - orientation.to_px(xy)
     return np.asarray(np.nanmedian(shifts, axis=0))
 

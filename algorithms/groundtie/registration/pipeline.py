@@ -171,7 +171,7 @@ def _exchanged(stages: Stages, evidence: RegistrationEvidence, context: Context)
 def _apart_px(evidence: RegistrationEvidence, way_back: Transform) -> float:
     """Return how far, at most, a transform and one back lead from where they began."""
     grid, transform = evidence.grid, evidence.estimate.transform
-    px = grid.lattice()
+    px = grid.places()
     there = transform.input_grid.pixel_to_map(transform(grid.pixel_to_map(px)))
     back = grid.map_to_pixel(way_back.input_grid.pixel_to_map(way_back(there)))
     return float(np.hypot(*(back - px).T).max())

@@ -156,7 +156,7 @@ class PoseSurveyEvidence(ImagesEvidence):
             self._error,
             len(self.found.agrees),
             "the overlap",
-            self.found.grid.lattice(),
+            self.found.grid.places(),
             least_share=SMALLEST_SHARE_UNROTATED if self.is_shift else SMALLEST_INLIER_SHARE,
         )
 

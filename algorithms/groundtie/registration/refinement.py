@@ -96,7 +96,7 @@ class RefinementEvidence:
     def held_out(self) -> Agreement:
         """How points that took no part agree with the refined RPCs."""
         name, _, after = self.held
-        nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).lattice()
+        nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).places()
         return Agreement.of(
             name,
             self._error,

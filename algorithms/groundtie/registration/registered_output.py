@@ -138,7 +138,7 @@ class BeyondOverlap:
         """
         if grid == REFERENCE_GRID:
             return None
-        xy = transform.inverse(transform.input_grid.lattice(_PLACES))
+        xy = transform.inverse(transform.input_grid.places(_PLACES))
         share = 1 - float(is_checked(xy).mean())
         return cls(share, transform.model.kind) if share >= _LEAST_BEYOND else None
 

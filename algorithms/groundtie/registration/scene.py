@@ -33,7 +33,7 @@ class ImageFacts:
     image
         The image.
     scene
-        The image on the matching lattice, with the masks that the user gave.
+        The image on the matching grid, continued, with the masks that the user gave.
     """
 
     image: Image
@@ -269,7 +269,7 @@ _FACTS = ("is_known_radar", "variation2", "strong_share")
 
 
 def scene_of(pair: ImagePair, name: str) -> Scene:
-    """Return one image of a pair on the matching lattice, as far as searches may reach."""
+    """Return one image of a pair on the matching grid, as far as searches may reach."""
     (image, to_px), grid = located(pair, name), pair.surroundings
     return Scene(grid, lambda at: image.read_onto(grid.window(*at), to_px), image.source)
 

@@ -41,7 +41,7 @@ class Correction:
     @classmethod
     def of(cls, transform: Transform, grid: Grid) -> Correction:
         """Measure a transform over the matching grid."""
-        px = grid.lattice()
+        px = grid.places()
         xy = grid.pixel_to_map(px)
         nominal = transform.model(xy)
         lengths = np.hypot(*(grid.map_to_pixel(nominal) - px).T)
@@ -93,7 +93,7 @@ def move_in_words(move: NDArray[np.float64], grid: Grid) -> str:
 
     Without georeferencing in matching pixels, as lengths are.
     """
-    # A map without georeferencing is the pixel lattice, y downwards.
+    # A map without georeferencing is the pixels, y downwards.
     on_map = grid.is_georeferenced
     ways = (("west", "east"), ("south", "north")) if on_map else (("left", "right"), ("up", "down"))
     unit_m = np.array(grid.metres_per_unit)

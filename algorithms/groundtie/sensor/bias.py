@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..geometry.models import monomials
 from ..rasters.grid import FloatArray
-from .rpc import RPC, image_lattice
+from .rpc import RPC, image_places
 from .rpc_fit import HEIGHTS, RPCFit, fit_rpc
 
 # Terms of each model, an axis, from the simplest to the most flexible.
@@ -88,12 +88,12 @@ def design(kind: str, size: tuple[int, int], px: FloatArray) -> FloatArray:
 def fold(rpc: RPC, bias: Bias) -> RPCFit:
     """Return RPCs that a correction is part of, and how far they miss it.
 
-    A shift moves the offsets, which is exact; other models are taken up by a new fit to a lattice
+    A shift moves the offsets, which is exact; other models are taken up by a new fit to positions
     over the image and the RPCs' range of heights.
     """
     if bias.kind == SHIFT:
         return RPCFit(rpc.shifted(bias.coefficients[0]), 0.0)
-    px, height = image_lattice(bias.size, np.linspace(*rpc.heights_m(), HEIGHTS))
+    px, height = image_places(bias.size, np.linspace(*rpc.heights_m(), HEIGHTS))
     lon_lat = rpc.localise(px, height)
     seen = np.isfinite(lon_lat).all(axis=1)
     lon_lat, height = lon_lat[seen], height[seen]

@@ -23,7 +23,7 @@ from ..rasters.grid import (
 )
 from ..rasters.reading import RasterSource
 from .heights import ConstantHeight, Heights, terrain_heights
-from .rpc import RPC, VALID_RANGE, image_lattice
+from .rpc import RPC, VALID_RANGE, image_places
 from .smooth_map import smooth_map
 
 # Heights found by intersecting a line of sight with the terrain are right to this, in metres.
@@ -239,7 +239,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float) -> FloatArray:
     GeoreferencingError
         The RPCs see no ground: they are not the image's.
     """
-    seen = finite(rpc.localise(*image_lattice(size, [height_m], _NODES)))
+    seen = finite(rpc.localise(*image_places(size, [height_m], _NODES)))
     if not len(seen):
         raise GeoreferencingError("the RPCs lead no pixel of the image to the ground")
     return seen

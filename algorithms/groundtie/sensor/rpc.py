@@ -27,7 +27,7 @@ VALID_RANGE = 1.5
 
 _HALF_TURN_DEG = 180.0
 
-# Nodes a side, along the ground and along height, of the lattice that the inverse starts from.
+# Nodes a side, along the ground and along height, of the positions that the inverse starts from.
 _START_NODES = (9, 9, 5)
 
 
@@ -201,7 +201,7 @@ class RPC:
     @property
     def is_regular(self) -> bool:
         """Whether no denominator vanishes within the scales, and the ground has an image there."""
-        values = self._coefficients @ _lattice_terms()[1]
+        values = self._coefficients @ _ground_terms()[1]
         low, high = values[2:].min(axis=1), values[2:].max(axis=1)
         if not (low * high > 0).all():
             return False
@@ -213,7 +213,7 @@ class RPC:
         return _Start.of(self)
 
 
-def image_lattice(
+def image_places(
     size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
 ) -> tuple[FloatArray, FloatArray]:
     """Return positions all over an image, each at several heights: what `localise` takes.
@@ -221,7 +221,7 @@ def image_lattice(
     Parameters
     ----------
     size
-        Width and height of the image in pixels; the lattice reaches to its corners.
+        Width and height of the image in pixels; positions reach to its corners.
     heights_m
         Heights above the ellipsoid.
     nodes
@@ -251,8 +251,8 @@ class _Start:
 
     @classmethod
     def of(cls, rpc: RPC) -> _Start:
-        """Fit the polynomials to a lattice on the ground."""
-        lph, terms = _lattice_terms()
+        """Fit the polynomials to positions all over the ground."""
+        lph, terms = _ground_terms()
         values = rpc._coefficients @ terms
         image = values[:2] / values[2:]
         low, high = image.min(axis=1, keepdims=True), image.max(axis=1, keepdims=True)
@@ -272,7 +272,7 @@ def _at_heights(positions: ArrayLike, height_m: ArrayLike) -> tuple[FloatArray, 
     return places, np.broadcast_to(np.asarray(height_m, float), len(places))
 
 
-def _lattice_terms() -> tuple[FloatArray, FloatArray]:
+def _ground_terms() -> tuple[FloatArray, FloatArray]:
     """Return normalised ground positions all over the scales, (3, n), and their terms, (20, n)."""
     axes = [np.linspace(-1, 1, nodes) for nodes in _START_NODES]
     lph = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)

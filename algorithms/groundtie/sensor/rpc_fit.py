@@ -20,7 +20,7 @@ _UNKNOWNS = 2 * TERMS - 1
 # one, leaves many of them open. Of the size of an exact fit's rounding errors.
 _RIDGE = 1e-9
 
-# Heights, over the range that RPCs are to hold for, of the lattice that they are fitted to.
+# Heights, over the range that RPCs are to hold for, of the positions that they are fitted to.
 HEIGHTS = 7
 
 # The denominator weighs the residuals; it is known better after each fit.
@@ -44,8 +44,8 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     Parameters
     ----------
     lon_lat
-        Longitude and latitude in degrees, shape (n, 2); usually a lattice over the scene at
-        several heights (see `rpc.image_lattice`).
+        Longitude and latitude in degrees, shape (n, 2); usually spread over the scene at
+        several heights (see `rpc.image_places`).
     height_m
         Height above the ellipsoid, shape (n,).
     px

@@ -18,7 +18,7 @@ Move = Callable[[FloatArray], FloatArray]
 PARAMETERS = 6
 
 # Positions a side of the square at which a move is sampled: a plane needs two, bends average out.
-_LATTICE = 5
+_SAMPLES = 5
 
 # What differs by less differs by rounding alone: corners of grids, or the linear part of a
 # displacement, at the frame's border, from that of a shift.
@@ -95,7 +95,7 @@ class SeriesFrame:
 
     def displacement_of(self, move: Move) -> FloatArray:
         """Return the displacement, (6,), that is nearest to a move of map positions."""
-        side = np.linspace(-1, 1, _LATTICE)
+        side = np.linspace(-1, 1, _SAMPLES)
         uv, square = mesh(side, side), self.square
         moved = (square.enter(move(square.leave(uv))) - uv) * self.half_px
         return np.asarray(np.linalg.lstsq(monomials(uv, 1), moved, rcond=None)[0]).ravel()

@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, mesh, reproject
-from ..sensor.rpc import image_lattice
+from ..sensor.rpc import image_places
 from ..sensor.rpc_fit import HEIGHTS, RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
 from .camera import PushBroom
@@ -245,7 +245,7 @@ def _rpcs(
     """Return the RPCs of the camera, and those with the error, over the image's own range."""
     reach_m = options.hills_m + _RPC_REACH_M
     heights_m = np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, HEIGHTS)
-    nominal, heights = image_lattice(options.scene.size_px, heights_m)
+    nominal, heights = image_places(options.scene.size_px, heights_m)
 
     def fitted(px: FloatArray) -> RPCFit:
         lon_lat = reproject(camera.localise(px, heights), grid.crs, LON_LAT)

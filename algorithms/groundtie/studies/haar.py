@@ -1,6 +1,6 @@
 """SURF's descriptor: sums of Haar wavelets around a keypoint, as 64 numbers ([Bay2008]).
 
-Wavelets are looked up in the integral image on a lattice that rotates and grows with the keypoint,
+Wavelets are looked up in the integral image at places that rotate and grow with the keypoint,
 for all keypoints at once.
 """
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..features.keypoints import Keypoints
-from ..features.sampling import lattice_around, square_lattice, unit_rows
+from ..features.sampling import samples_around, square_samples, unit_rows
 from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..similarity.orientation import compress
@@ -101,9 +101,9 @@ def _counts(mask: NDArray[np.bool_]) -> IntegralImage:
 
 
 def _wavelets(
-    sums: _Sums, points: Keypoints, lattice: FloatArray, half_scales: float
+    sums: _Sums, points: Keypoints, samples: FloatArray, half_scales: float
 ) -> tuple[FloatImage, FloatImage]:
-    """Return Haar wavelets on a lattice around each feature.
+    """Return Haar wavelets at samples around each feature.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _wavelets(
         The image's integrals.
     points
         n features.
-    lattice
+    samples
         In scales of a feature, along and across its orientation, shape (m, 2).
     half_scales
         Half the wavelets' side, in scales.
@@ -121,7 +121,7 @@ def _wavelets(
     Wavelets along and across the features' orientation, shape (n, m) each.
     """
     cosine, sine = np.cos(points.orientation_rad)[:, None], np.sin(points.orientation_rad)[:, None]
-    x, y = lattice_around(points, lattice)
+    x, y = samples_around(points, samples)
     half = np.maximum(np.rint(half_scales * points.scale_px[:, None]), 1).astype(np.intp)
     height, width = sums.grey.shape
     # Positions of the integral image are the corners of pixels.
@@ -146,9 +146,9 @@ def _wavelets(
 
 def _described(sums: _Sums, points: Keypoints) -> FloatImage:
     """Return the descriptors of features, shape (n, 64)."""
-    lattice = square_lattice(CELLS * _SAMPLES / 2, CELLS * _SAMPLES)
-    window = np.exp(-(lattice**2).sum(axis=1) / (2 * _WINDOW_SCALES**2)).astype(np.float32)
-    both = [window * part for part in _wavelets(sums, points, lattice, _HALF_SCALES)]
+    samples = square_samples(CELLS * _SAMPLES / 2, CELLS * _SAMPLES)
+    window = np.exp(-(samples**2).sum(axis=1) / (2 * _WINDOW_SCALES**2)).astype(np.float32)
+    both = [window * part for part in _wavelets(sums, points, samples, _HALF_SCALES)]
     parts = np.stack([*both, *map(np.abs, both)], axis=-1)
     cells = parts.reshape(len(points), CELLS, _SAMPLES, CELLS, _SAMPLES, 4).sum(axis=(2, 4))
     return unit_rows(cells.reshape(len(points), LENGTH))
@@ -156,12 +156,12 @@ def _described(sums: _Sums, points: Keypoints) -> FloatImage:
 
 def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:
     """Return the direction in which most wavelets of a sector of 60° point, shape (n,)."""
-    lattice = square_lattice(_REACH_SCALES + 0.5, 2 * _REACH_SCALES + 1)
-    squared = (lattice**2).sum(axis=1)
-    lattice, squared = lattice[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]
+    samples = square_samples(_REACH_SCALES + 0.5, 2 * _REACH_SCALES + 1)
+    squared = (samples**2).sum(axis=1)
+    samples, squared = samples[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]
     window = np.exp(-squared / (2 * _ORIENTATION_WINDOW_SCALES**2)).astype(np.float32)
     upright = replace(points, orientation_rad=np.zeros(len(points)))
-    along_cols, along_rows = _wavelets(sums, upright, lattice, _ORIENTATION_HALF_SCALES)
+    along_cols, along_rows = _wavelets(sums, upright, samples, _ORIENTATION_HALF_SCALES)
     direction = np.arctan2(along_rows, along_cols)
     bins = np.floor(direction * (_BINS / (2 * np.pi))).astype(np.intp) % _BINS
     owner = np.arange(len(points))[:, None] * _BINS

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features.keypoints import Keypoints
-from ..features.sampling import sampled_gradient, square_lattice
+from ..features.sampling import sampled_gradient, square_samples
 from ..features.scale_space import (
     Gradient,
     GradientOperator,
@@ -30,11 +30,11 @@ _ORIENTATION_SAMPLES = 19
 def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np.int_]]:
     """Return keypoints once for each of their orientations, and which of `points` each one is."""
     half = _REACH_WIDTHS * _ORIENTATION_SCALES
-    lattice = square_lattice(half, _ORIENTATION_SAMPLES)
-    lattice = lattice[np.hypot(*lattice.T) <= half]
+    samples = square_samples(half, _ORIENTATION_SAMPLES)
+    samples = samples[np.hypot(*samples.T) <= half]
     upright = replace(points, orientation_rad=np.zeros(len(points)))
-    strength, direction = sampled_gradient(fields, upright, lattice)
-    window = np.exp(-(lattice**2).sum(axis=1) / (2 * _ORIENTATION_SCALES**2))
+    strength, direction = sampled_gradient(fields, upright, samples)
+    window = np.exp(-(samples**2).sum(axis=1) / (2 * _ORIENTATION_SCALES**2))
     bins = np.rint(direction * (_BINS / (2 * np.pi))).astype(int) % _BINS
     owner = np.arange(len(points))[:, None]
     histogram = np.bincount(
