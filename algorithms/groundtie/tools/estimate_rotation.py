@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..errors import NotRegisteredError, ParameterError
 from ..geometry.transform import Transform
 from ..kinds import AUTO, Choice, Distance, Number
 from ..pose.pose import Pose
-from ..pose.rotation_windows import PoseWindows, read_windows
+from ..pose.rotation_windows import read_windows
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_json
 from ..rasters.pair import Image
@@ -212,11 +211,15 @@ def estimate_rotation(
             title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
             draw_rotation(outputs.stage(picture), *pair, limits, pose, title, context.quiet())
         if verdict.accepted and pose is not None:
-            files = {"transform": transform, "picture": picture}
-            result = _result(windows, pose, (verdict, evidence), search, files)
+            found_transform = windows.transform(pose)
             if transform is not None:
-                write_json(outputs.stage(transform), result.transform.to_json())
-            return result
+                write_json(outputs.stage(transform), found_transform.to_json())
+            right, down = (float(shift) * windows.pixel_m for shift in pose.shift_px)
+            unit = "m" if windows.is_georeferenced else "px"
+            files = given_files({"transform": transform, "picture": picture})
+            return RotationResult(
+                verdict, evidence, pose, right, down, unit, found_transform, search, files
+            )
     raise NotRegisteredError(
         f"no rotation of {input} against {reference} was found: {verdict.sentence()}", verdict
     )
@@ -228,23 +231,3 @@ def _similarity(search: str, wanted: str) -> str:
     if search in HISTOGRAM_SEARCHES and wanted != "nmi":
         raise ParameterError(f"the search {search} needs the similarity nmi")
     return wanted
-
-
-def _result(
-    windows: PoseWindows,
-    pose: Pose,
-    judged: tuple[Verdict, PoseEvidence],
-    search: str,
-    files: Mapping[str, Path | None],
-) -> RotationResult:
-    right, down = (float(shift) * windows.pixel_m for shift in pose.shift_px)
-    return RotationResult(
-        *judged,
-        pose,
-        right,
-        down,
-        "m" if windows.is_georeferenced else "px",
-        windows.transform(pose),
-        search,
-        given_files(files),
-    )
