@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,9 @@ from .library import kinds
 from .translation import tr
 from .wording import choice_label
 
+# A class of definitions, and what it takes besides name and label.
+Made = tuple[Callable[..., QgsProcessingParameterDefinition], dict[str, Any]]
+
 
 def qgis_name(name: str) -> str:
     """Return the name that a declared parameter or output has in Processing."""
@@ -41,8 +44,12 @@ def qgis_name(name: str) -> str:
 
 def definition(parameter: Any) -> QgsProcessingParameterDefinition:
     """Return the Processing definition of a declared parameter."""
-    made = _make(parameter.kind, parameter, qgis_name(parameter.name))
-    if parameter.kind.advanced:
+    kind = parameter.kind
+    unit = getattr(kind, "unit", "")
+    label = f"{tr(kind.label)} ({unit})" if unit else tr(kind.label)
+    make, options = _made_of(kind, parameter)
+    made = make(qgis_name(parameter.name), label, **options)
+    if kind.advanced:
         made.setFlags(made.flags() | compat.ADVANCED)
     return made
 
@@ -57,33 +64,43 @@ def file_filter(suffixes: tuple[str, ...], any_case: bool = False) -> str:
     return ";;".join(f"{files.format(s[1:].upper())} ({endings[s]})" for s in suffixes)
 
 
-# In Processing, "optional" means that a value may be absent: with a default there always is one.
-def _optional(parameter: Any) -> bool:
-    return not parameter.required and parameter.default is None
+def _optional(parameter: Any) -> dict[str, Any]:
+    return {"optional": not parameter.required}
+
+
+def _default(parameter: Any) -> dict[str, Any]:
+    # In Processing, "optional" means that a value may be absent: with a default there always is.
+    is_absent = not parameter.required and parameter.default is None
+    return {"defaultValue": parameter.default, "optional": is_absent}
+
+
+def _destination(parameter: Any) -> dict[str, Any]:
+    is_shown = getattr(parameter.kind, "shown", False)
+    return {**_optional(parameter), "createByDefault": parameter.required or is_shown}
 
 
 @singledispatch
-def _make(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+def _made_of(kind: Any, parameter: Any) -> Made:
+    """Return the class of a parameter's definition, and what it takes besides name and label."""
     raise TypeError(f"no Processing parameter for {type(kind).__name__}")
 
 
-@_make.register(kinds.RasterIn)
-def _raster_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterRasterLayer(name, tr(kind.label), optional=not parameter.required)
+@_made_of.register(kinds.RasterIn)
+def _raster_in(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterRasterLayer, _optional(parameter)
 
 
-@_make.register(kinds.RastersIn)
-def _rasters_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterMultipleLayers(
-        name, tr(kind.label), layerType=compat.RASTER, optional=not parameter.required
-    )
+@_made_of.register(kinds.RastersIn)
+def _rasters_in(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterMultipleLayers, {
+        "layerType": compat.RASTER,
+        **_optional(parameter),
+    }
 
 
-@_make.register(kinds.VectorIn)
-def _vector_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterVectorLayer(
-        name, tr(kind.label), types=[compat.ANY_VECTOR], optional=not parameter.required
-    )
+@_made_of.register(kinds.VectorIn)
+def _vector_in(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterVectorLayer, {"types": [compat.ANY_VECTOR], **_optional(parameter)}
 
 
 class LayerOrFile(QgsProcessingParameterMapLayer):
@@ -104,14 +121,9 @@ class LayerOrFile(QgsProcessingParameterMapLayer):
         return copy
 
 
-@_make.register(kinds.MaskIn)
-def _mask_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return LayerOrFile(
-        name,
-        tr(kind.label),
-        optional=not parameter.required,
-        types=[compat.RASTER, compat.GEOMETRY],
-    )
+@_made_of.register(kinds.MaskIn)
+def _mask_in(kind: Any, parameter: Any) -> Made:
+    return LayerOrFile, {"types": [compat.RASTER, compat.GEOMETRY], **_optional(parameter)}
 
 
 def takes_layers(kind: Any) -> bool:
@@ -119,64 +131,44 @@ def takes_layers(kind: Any) -> bool:
     return isinstance(kind, kinds.FileIn) and ".gpkg" in kind.suffixes
 
 
-@_make.register(kinds.FileIn)
-def _file_in(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+@_made_of.register(kinds.FileIn)
+def _file_in(kind: Any, parameter: Any) -> Made:
     if takes_layers(kind):
-        return LayerOrFile(
-            name, tr(kind.label), optional=not parameter.required, types=[compat.GEOMETRY]
-        )
-    return QgsProcessingParameterFile(
-        name,
-        tr(kind.label),
-        behavior=compat.FILE,
-        optional=not parameter.required,
-        fileFilter=file_filter(kind.suffixes, any_case=True),
-    )
+        return LayerOrFile, {"types": [compat.GEOMETRY], **_optional(parameter)}
+    files = {"behavior": compat.FILE, "fileFilter": file_filter(kind.suffixes, any_case=True)}
+    return QgsProcessingParameterFile, {**files, **_optional(parameter)}
 
 
-@_make.register(kinds.RasterOut)
-def _raster_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterRasterDestination(name, tr(kind.label), None, *_wanted(parameter))
+@_made_of.register(kinds.RasterOut)
+def _raster_out(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterRasterDestination, _destination(parameter)
 
 
-@_make.register(kinds.VectorOut)
-def _vector_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterVectorDestination(
-        name, tr(kind.label), compat.ANY_VECTOR, None, *_wanted(parameter)
-    )
+@_made_of.register(kinds.VectorOut)
+def _vector_out(kind: Any, parameter: Any) -> Made:
+    options = {"type": compat.ANY_VECTOR, **_destination(parameter)}
+    return QgsProcessingParameterVectorDestination, options
 
 
-@_make.register(kinds.FileOut)
-def _file_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterFileDestination(
-        name, tr(kind.label), file_filter(kind.suffixes), None, *_wanted(parameter)
-    )
+@_made_of.register(kinds.FileOut)
+def _file_out(kind: Any, parameter: Any) -> Made:
+    options = {"fileFilter": file_filter(kind.suffixes), **_destination(parameter)}
+    return QgsProcessingParameterFileDestination, options
 
 
-@_make.register(kinds.FolderOut)
-def _folder_out(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    required = parameter.required
-    return QgsProcessingParameterFolderDestination(
-        name, tr(kind.label), None, not required, required
-    )
+@_made_of.register(kinds.FolderOut)
+def _folder_out(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterFolderDestination, _destination(parameter)
 
 
-def _wanted(parameter: Any) -> tuple[bool, bool]:
-    """Return a destination's `optional` and `createByDefault`."""
-    return not parameter.required, parameter.required or parameter.kind.shown
-
-
-@_make.register(kinds.Number)
-def _number(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+@_made_of.register(kinds.Number)
+def _number(kind: Any, parameter: Any) -> Made:
     limits = {"minValue": kind.minimum, "maxValue": kind.maximum}
-    return QgsProcessingParameterNumber(
-        name,
-        f"{tr(kind.label)} ({kind.unit})" if kind.unit else tr(kind.label),
-        type=compat.INTEGER if kind.integer else compat.DOUBLE,
-        defaultValue=parameter.default,
-        optional=_optional(parameter),
+    return QgsProcessingParameterNumber, {
+        "type": compat.INTEGER if kind.integer else compat.DOUBLE,
+        **_default(parameter),
         **{limit: value for limit, value in limits.items() if math.isfinite(value)},
-    )
+    }
 
 
 class WordOrNumber(QgsProcessingParameterEnum):
@@ -211,44 +203,34 @@ def _whole_number(text: str) -> int:
     return int(text) if text.isascii() and text.isdigit() else -1
 
 
-@_make.register(kinds.Choice)
-def _choice(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    default = parameter.default
-    return WordOrNumber(
-        name,
-        tr(kind.label),
-        kind.choices,
-        defaultValue=None if default is None else kind.choices.index(default),
-        optional=_optional(parameter),
-    )
+@_made_of.register(kinds.Choice)
+def _choice(kind: Any, parameter: Any) -> Made:
+    options = {"words": kind.choices, **_default(parameter)}
+    if parameter.default is not None:
+        options["defaultValue"] = kind.choices.index(parameter.default)
+    return WordOrNumber, options
 
 
-@_make.register(kinds.Flag)
-def _flag(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterBoolean(name, tr(kind.label), defaultValue=parameter.default)
+@_made_of.register(kinds.Flag)
+def _flag(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterBoolean, {"defaultValue": parameter.default}
 
 
-@_make.register(kinds.Text)
-def _text(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterString(
-        name, tr(kind.label), defaultValue=parameter.default, optional=_optional(parameter)
-    )
+@_made_of.register(kinds.Text)
+def _text(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterString, _default(parameter)
 
 
-@_make.register(kinds.Crs)
-def _crs(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
-    return QgsProcessingParameterCrs(
-        name, tr(kind.label), defaultValue=parameter.default, optional=_optional(parameter)
-    )
+@_made_of.register(kinds.Crs)
+def _crs(kind: Any, parameter: Any) -> Made:
+    return QgsProcessingParameterCrs, _default(parameter)
 
 
-@_make.register(kinds.Band)
-def _band(kind: Any, parameter: Any, name: str) -> QgsProcessingParameterDefinition:
+@_made_of.register(kinds.Band)
+def _band(kind: Any, parameter: Any) -> Made:
     # QGIS 3.22 takes a band with a default for mandatory: a band is always optional.
-    return QgsProcessingParameterBand(
-        name,
-        tr(kind.label),
-        defaultValue=parameter.default,
-        parentLayerParameterName=qgis_name(kind.of),
-        optional=not parameter.required,
-    )
+    return QgsProcessingParameterBand, {
+        "defaultValue": parameter.default,
+        "parentLayerParameterName": qgis_name(kind.of),
+        **_optional(parameter),
+    }
