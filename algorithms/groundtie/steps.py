@@ -154,7 +154,8 @@ def match_chips(
     model
         The misregistration on the map as known so far; None: none.
     radius_px
-        How far it may be wrong, in matching pixels.
+        How far it may be wrong, in matching pixels. All shifts of each chip are compared: time
+        grows with its square. What lies far off is searched for by `coregister`.
     spec
         How chips are laid out, masked and compared.
     context
