@@ -53,7 +53,8 @@ class Comparison:
         grid = pictures.overview_grid(pair.grid)
         bare = without_masks(pair)
         reference = bare.reference_patch(grid)
-        shown = {"reference": pictures.jpeg_uri(pictures.grey_picture(reference))}
+        seen = pictures.grey_picture(reference)
+        shown = {"reference": pictures.jpeg_uri(seen)}
         masks = {}
         if pair.reference.mask is not None:
             masks["reference"] = _tint(reference, pair.reference_patch(grid))
@@ -69,7 +70,7 @@ class Comparison:
             shown["reference"],
             shown["nominal"],
             shown.get("registered"),
-            pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(reference))),
+            pictures.jpeg_uri(pictures.backdrop(seen)),
             file_name(pair.reference.source.path),
             file_name(pair.input.source.path),
             grid.width,
