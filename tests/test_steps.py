@@ -188,6 +188,26 @@ class TestFit:
         with pytest.raises(TooFewPointsError, match="at least 3 points; there are 2"):
             steps.fit_model("translation", np.zeros((2, 2)), np.zeros((2, 2)))
 
+    @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine", "polynomial2", "tps"])
+    def test_points_at_one_place(self, kind: str) -> None:
+        xy = np.full((12, 2), 50.0)
+        with pytest.raises(TooFewPointsError, match="do not all lie at one place"):
+            steps.fit_model(kind, xy, xy + SHIFT)
+
+    @pytest.mark.parametrize("kind", ["affine", "tps"])
+    def test_points_on_a_line(self, kind: str) -> None:
+        xy = np.linspace(0, 110, 12)[:, None] * [1, 0.3] + [7, 11]
+        with pytest.raises(TooFewPointsError, match="do not all lie on a line"):
+            steps.fit_model(kind, xy, xy + SHIFT)
+        steps.fit_model("similarity", xy, xy + SHIFT)
+
+    def test_points_on_two_rows(self) -> None:
+        """Which are a curve of degree 2, of which nothing tells how the model bends across."""
+        xy = np.stack(np.meshgrid(np.linspace(0, 300, 8), [0.0, 200.0]), -1).reshape(-1, 2)
+        steps.fit_model("affine", xy, xy + SHIFT)
+        with pytest.raises(TooFewPointsError, match="do not all lie on a curve of degree 2"):
+            steps.fit_model("polynomial2", xy, xy + SHIFT)
+
     def test_a_kind_that_is_none(self) -> None:
         with pytest.raises(ParameterError, match=r"one of translation, .*, not 'rubb'"):
             steps.fit_model("rubb", np.zeros((9, 2)), np.zeros((9, 2)))

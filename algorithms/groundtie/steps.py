@@ -20,6 +20,7 @@ from .arrays import Raster
 from .context import Context, threads
 from .errors import ParameterError, TooFewPointsError
 from .geometry.estimation import Estimate, fit_without_blocks
+from .geometry.fitting import require_determined
 from .geometry.models import KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
 from .geometry.tie_points import TiePoints
@@ -153,7 +154,8 @@ def match_chips(
     model
         The misregistration on the map as known so far; None: none.
     radius_px
-        How far it may be wrong, in matching pixels.
+        How far it may be wrong, in matching pixels. All shifts of each chip are compared: time
+        grows with its square. What lies far off is searched for by `coregister`.
     spec
         How chips are laid out, masked and compared.
     context
@@ -227,7 +229,8 @@ def fit_model(
         There is no such kind of model, the positions are no pairs of finite numbers, or a number is
         out of its range.
     TooFewPointsError
-        Too few pairs agree with a model of this kind.
+        Too few pairs agree with a model of this kind, or those that do lie so that they do not
+        determine it: at one place, or on a line.
     """
     kind = _KIND.check("kind", kind)
     pixel_size = _above_0("pixel_size", pixel_size)
@@ -246,6 +249,7 @@ def fit_model(
         )
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
+    require_determined(kind, px)
     # A person's own points may be of images of any rotation and scale.
     start = find_consensus(px, nominal_px, tolerance_px, kind, seed, np.inf)
     model, mixture = fit_robustly(
@@ -256,6 +260,7 @@ def fit_model(
         start,
         (2 * radius_px + 1) ** 2,
     )
+    require_determined(kind, px[mixture.inliers])
     residuals = (nominal_px - model(px))[mixture.inliers]
     # The mixture's own is kept within what matches have.
     sigma = float(np.sqrt((residuals**2).mean())) * pixel_size

@@ -17,6 +17,7 @@ from html_pages import Page, picture_of
 from raster_files import UTM, utm_grid, wave_image, write_raster
 from rasterio.crs import CRS
 
+from groundtie.arrays import Raster
 from groundtie.assessment.accuracy import Assessment
 from groundtie.assessment.comparison import Comparison, compare
 from groundtie.assessment.point_errors import PointErrors
@@ -72,6 +73,19 @@ def likeness(one: np.ndarray, other: np.ndarray) -> float:
 
 
 class TestComparison:
+    @pytest.mark.parametrize("shift", [0.0, 0.3, -5.0])
+    @pytest.mark.parametrize("wests", [(-180, -180), (-180, 0), (0, -180), (-90, 0)])
+    def test_the_whole_earth_is_shown_whole(self, wests: tuple[int, int], shift: float) -> None:
+        """Outlines that a few thousandths of a degree took across 180° left out a twentieth."""
+        values = np.random.default_rng(0).uniform(size=(2, 90, 180))
+        places = [Affine(2, 0, west, 0, -2, 90) for west in wests]
+        reference, input = (
+            open_raster(Raster(image, place, LONLAT))
+            for image, place in zip(values, places, strict=True)
+        )
+        transform = shifted(np.array([shift, 0.0]), input.grid, LONLAT)
+        assert compare(reference, input, transform).width == 180
+
     def test_the_registered_input_looks_like_the_reference(self, opened: Opened) -> None:
         found = compare(opened.reference, opened.input, shifted(SHIFT_M))
         reference = grey(found.reference)

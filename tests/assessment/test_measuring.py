@@ -11,6 +11,7 @@ from known_errors import DEGREES, GRID, PLAIN, shifted
 from raster_files import UTM, write_raster
 from rasterio.crs import CRS
 
+from groundtie.arrays import Raster
 from groundtie.assessment.measuring import matching_px, measure_check_points, measure_tie_points
 from groundtie.errors import GeoreferencingError, TooFewPointsError, TransformFileError
 from groundtie.geometry.tie_point_files import write_tie_points
@@ -45,6 +46,13 @@ def test_images_are_matched_in_pixels_of_the_coarser(
     with open_raster(path) as reference:
         assert matching_px(shifted(37.0, -24.0), reference) == pytest.approx(expected)
     assert matching_px(shifted(37.0, -24.0), None) == 1
+
+
+def test_nothing_is_known_of_pixels_that_lie_outside_of_the_transforms_map() -> None:
+    # In the middle, a quarter turn from the zone's.
+    grid = Affine(0.5, 0, 98.25, 0, -0.5, 0.75)
+    far = open_raster(Raster(np.zeros((3, 3), np.uint8), grid, CRS.from_epsg(4326)))
+    assert matching_px(shifted(0.0, 0.0), far) == 1
 
 
 class TestFiles:

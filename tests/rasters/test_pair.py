@@ -445,6 +445,15 @@ def test_a_narrow_border_of_zeros_is_empty_and_the_images_own_border_is_not(file
     assert around.valid[17:110, 10:130].all()
 
 
+def test_an_image_that_the_references_map_has_no_place_for(files: Files) -> None:
+    """A quarter turn from a zone's middle, on the equator, its map ends."""
+    away = Grid(Affine(1e-4, 0, 98.997, 0, -1e-4, 0.003), GEOGRAPHIC, 60, 60)
+    values = np.arange(3600, dtype=np.float32).reshape(60, 60)
+    message = r"image2\.tif lies nowhere on the map of .*image1\.tif: .* EPSG:4326 to EPSG:32632"
+    with pytest.raises(NoOverlapError, match=message):
+        make_pair(files.image(), Image(files.open(values, away)))
+
+
 @pytest.mark.parametrize("asked_m", [500.0, 1e5, 1e9])
 def test_nothing_is_searched_where_the_images_cannot_overlap(files: Files, asked_m: float) -> None:
     pair = make_pair(files.image(), files.image(GRID.shifted(200, 0)), search_radius_m=asked_m)

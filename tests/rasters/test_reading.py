@@ -120,9 +120,43 @@ def test_what_single_precision_cannot_hold_is_as_nan(
     assert not found[1][0, 0] and found[1][-1, -1]
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("lowest", [float(np.finfo(np.float32).min), -3.4028235e38, -3.402823e38])
+def test_the_lowest_number_of_single_precision_is_no_measurement(
+    lowest: float, dtype: type[np.floating]
+) -> None:
+    """ArcGIS' fill value, also as text has it, in files that do not declare it."""
+    values = np.full((2, 40, 60), 5.0, dtype)
+    values[:, :2, :3] = max(lowest, float(np.finfo(dtype).min))
+    expected = values[0] == 5
+    source = open_raster(values)
+    for band in (None, 1):
+        found, valid = source.read(source.window, band)
+        np.testing.assert_array_equal(valid, expected)
+        np.testing.assert_array_equal(found, np.where(expected, 5, 0))
+    found, valid = source.read_bands(source.window)
+    np.testing.assert_array_equal(valid, np.stack([expected] * 2))
+    np.testing.assert_array_equal(found, np.where(valid, 5, 0))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_low_and_high_numbers_are_measurements(dtype: type[np.floating]) -> None:
+    values = np.array([[-1e30, 1e30, float(np.finfo(np.float32).max)]], dtype)
+    assert open_raster(values).read(Window(0, 0, 3, 1))[1].all()
+    assert open_raster(values).read_bands(Window(0, 0, 3, 1))[1].all()
+
+
+def test_amplitudes_that_single_precision_cannot_hold_are_as_nan() -> None:
+    values = np.full((4, 6), 3 + 4j, np.complex64)
+    values[0, 0] = 3e38 + 3e38j
+    found, valid = open_raster(values).read(Window(0, 0, 6, 4))
+    np.testing.assert_array_equal(valid, found == 5)
+    assert not valid[0, 0]
+
+
 def test_means_that_single_precision_cannot_hold_are_as_nan() -> None:
     values = np.full((40, 60), 5.0, np.float32)
-    values[:4, :4] = np.finfo(np.float32).min
+    values[:4, :4] = np.finfo(np.float32).max
     found, valid = open_raster(values).read(Window(0, 0, 60, 40), out_shape=(20, 30))
     assert np.isfinite(found).all()
     np.testing.assert_array_equal(valid, (found == 5))

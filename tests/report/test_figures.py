@@ -10,6 +10,7 @@ import pytest
 import scipy.stats
 from affine import Affine
 from html_pages import decoded
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 from rasterio.crs import CRS
@@ -36,6 +37,11 @@ VERDICT = Verdict(True, "check points confirm", 6, 5, 4, 3, 1.0, 2.0, 1.52, 3.04
 AT_PX = np.array([[10.0, 20], [250, 30], [40, 150], [280, 190], [60, 60], [150, 100], [160, 40]])
 ERROR_PX = np.array([[1.0, 0], [0, -1.5], [0.5, 0.5], [-1, 1], [9, -3], [0, 0], [1.5, 1.5]])
 IS_CHECK = np.array([False, False, False, True, True, True, True])
+
+
+def mapped(errors: PointErrors) -> Figure:
+    """Return the map of residuals."""
+    return figures.residual_map(errors, figures.residual_arrows(errors, GRID), GRID)
 
 
 def tie_points(
@@ -120,7 +126,7 @@ def test_arrows_without_check_points_or_any_point(only_fit: bool) -> None:
     arrows = figures.residual_arrows(residuals, GRID)
     # 4 % of 300 px over the median of 1 and 1.5 px is 9.6.
     assert arrows.exaggeration == (5 if only_fit else 1)
-    figures.svg_uri(figures.residual_map(residuals, GRID))
+    figures.svg_uri(mapped(residuals))
 
 
 @pytest.mark.parametrize(
@@ -132,7 +138,7 @@ def test_round_numbers(value: float, rounded: float) -> None:
 
 
 def test_the_map_draws_these_arrows_and_its_scale() -> None:
-    figure = figures.residual_map(measured(), GRID)
+    figure = mapped(measured())
     (axes,) = figure.axes
     quivers = [artist for artist in axes.collections if isinstance(artist, Quiver)]
     drawn = {
@@ -166,7 +172,7 @@ def test_the_scale_hides_no_points(free: int) -> None:
 
 
 def test_the_map_has_the_shape_and_the_limits_of_the_grid() -> None:
-    figure = figures.residual_map(measured(), GRID)
+    figure = mapped(measured())
     width, height = figure.get_size_inches()
     assert width / height == pytest.approx(300 / 200)
     assert figure.axes[0].get_xlim() == (-0.5, 299.5)
@@ -174,7 +180,7 @@ def test_the_map_has_the_shape_and_the_limits_of_the_grid() -> None:
 
 
 def test_check_points_look_different_from_points_of_the_fit() -> None:
-    lines = figures.residual_map(measured(), GRID).axes[0].lines
+    lines = mapped(measured()).axes[0].lines
     looks = [(line.get_marker(), line.get_color()) for line in lines]
     assert len(set(looks)) == len(looks) == 4
     assert [len(line.get_xdata()) for line in lines] == [1, 2, 2, 2]
@@ -233,9 +239,7 @@ def test_the_rayleigh_curve_is_the_distribution_of_the_rmse() -> None:
 
 
 def test_figures_are_svg() -> None:
-    root = ElementTree.fromstring(
-        decoded(figures.svg_uri(figures.residual_map(measured(), GRID)), "image/svg+xml")
-    )
+    root = ElementTree.fromstring(decoded(figures.svg_uri(mapped(measured())), "image/svg+xml"))
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     left, top, width, height = (float(part) for part in root.attrib["viewBox"].split())
     assert (left, top) == (0, 0)

@@ -7,12 +7,15 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from affine import Affine
 from html_pages import decoded, picture_of
 from raster_files import utm_grid
+from rasterio.crs import CRS
 
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import Frame
 from groundtie.geometry.transform import Transform
+from groundtie.rasters.grid import Grid, mesh
 from groundtie.rasters.patch import Patch
 from groundtie.report import pictures
 
@@ -49,6 +52,18 @@ def test_a_transform_that_ends_within_the_grid_has_no_stand_in() -> None:
         return np.where(xy[:, :1] > 500_300, np.inf, xy)
 
     assert pictures.overview_positions(half, GRID) is half
+
+
+def test_an_overview_across_the_end_of_the_whole_earth() -> None:
+    """A spline through the jump from its last column to its first was off by all of it."""
+    grid, other = (
+        Grid(Affine(0.5, 0, west, 0, -0.5, 90), CRS.from_epsg(4326), 720, 360)
+        for west in (0.0, -180.0)
+    )
+    transform = Transform.nominal(grid.crs, other)
+    places = grid.pixel_to_map(mesh(np.arange(720), [0, 180, 359]))
+    found = pictures.overview_positions(transform, grid)(places)
+    np.testing.assert_allclose(found, transform(places), atol=0.1)
 
 
 def test_contrast_is_stretched_between_the_2nd_and_98th_percentile() -> None:

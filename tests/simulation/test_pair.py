@@ -75,6 +75,11 @@ class TestShapes:
         with pytest.raises(ParameterError, match="input_pixel_size_m"):
             simulate_pair(replace(SMALL, input_pixel_size_m=50.0))
 
+    def test_refuses_a_scene_that_is_larger_than_its_map(self) -> None:
+        scene = replace(SMALL.scene, pixel_size_m=1e6)
+        with pytest.raises(ParameterError, match="is larger than its map: take smaller pixels"):
+            simulate_pair(replace(SMALL, scene=scene))
+
 
 class TestContent:
     def test_no_pixel_is_empty(self, small: SimulatedPair) -> None:

@@ -231,3 +231,11 @@ class TestFiles:
 def test_refuses_a_view_that_is_too_flat() -> None:
     with pytest.raises(ParameterError):
         SensorOptions(optical=OpticalOptions(off_nadir_deg=50.0))
+
+
+@pytest.mark.parametrize(
+    ("pixel_m", "message"), [(8e5, "ground beyond the map"), (1e7, "is larger than its map")]
+)
+def test_refuses_a_scene_that_is_larger_than_the_map(pixel_m: float, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        simulate_sensor_image(SensorOptions(SceneOptions((16, 16), pixel_m)))

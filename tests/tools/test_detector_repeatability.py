@@ -8,11 +8,15 @@ import cv2
 import pytest
 from brightness_classifiers import bright_is_left_out
 from raster_files import write_raster
+from rasterio.crs import CRS
 from speckled_pairs import write_speckled_pair
 from textured_pairs import TexturedPair, listing, pixels, shift_on_map
 
 from groundtie import detector_repeatability
-from groundtie.errors import OutputError, ParameterError
+from groundtie.errors import NoOverlapError, OutputError, ParameterError
+from groundtie.geometry.models import shift_model
+from groundtie.geometry.transform import Transform
+from groundtie.rasters.reading import open_raster
 
 SIZE = (260, 240)
 
@@ -67,6 +71,41 @@ def test_a_transform_registers_the_input(tmp_path: Path, registered: TexturedPai
         for given in (path, None)
     )
     assert with_it.repeated[0] > 3 * without.repeated[0]
+
+
+@pytest.mark.parametrize("epsg", [4326, 32631])
+def test_a_transform_may_be_of_another_map(
+    tmp_path: Path, registered: TexturedPair, epsg: int
+) -> None:
+    """Its positions were taken for the reference's: nothing was found, and nothing said."""
+    with open_raster(registered.input) as source:
+        other = Transform.nominal(CRS.from_epsg(epsg), source.grid)
+    path = tmp_path / "other.json"
+    path.write_text(json.dumps(other.to_json()))
+    same, without = (
+        detector_repeatability(
+            registered.reference,
+            registered.input,
+            tmp_path / "t.csv",
+            variants="sift-oct",
+            transform=given,
+        ).evaluations[0]
+        for given in (path, None)
+    )
+    assert same.detections == pytest.approx(without.detections, rel=0.02)
+    assert same.repeated[0] == pytest.approx(without.repeated[0], abs=0.02)
+
+
+def test_nothing_that_both_show(tmp_path: Path, registered: TexturedPair) -> None:
+    with open_raster(registered.input) as source:
+        far = Transform(shift_model(1e6, 0.0), source.grid.crs, source.grid)
+    path = tmp_path / "far.json"
+    path.write_text(json.dumps(far.to_json()))
+    with pytest.raises(NoOverlapError, match="they show nothing together"):
+        detector_repeatability(
+            registered.reference, registered.input, tmp_path / "t.csv", transform=path
+        )
+    assert list(listing(tmp_path)) == ["far.json"]
 
 
 def test_the_middle_of_a_large_overlap_is_looked_at(

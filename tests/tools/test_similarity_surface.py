@@ -104,6 +104,22 @@ def test_parameters_of_the_measures(
     assert plain.values.shape != result.values.shape or (plain.values != result.values).any()
 
 
+@pytest.mark.parametrize("order", [-100, 100])
+def test_an_order_of_which_single_precision_holds_nothing(
+    textured: TexturedPair, tmp_path: Path, order: float
+) -> None:
+    """The surface was flat, and its peak in a corner."""
+    with pytest.raises(ParameterError, match="beyond single precision: take an order nearer to 1"):
+        similarity_surface(
+            textured.reference,
+            textured.input,
+            tmp_path / "surface.tif",
+            similarity="tsallis",
+            entropy_order=order,
+        )
+    assert not listing(tmp_path)
+
+
 def test_all_grey_values(textured: TexturedPair, tmp_path: Path) -> None:
     """About a hundred of them in each image: as many bins and more take none together."""
     coarser = rewritten(

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..errors import NoOverlapError
 from ..geometry.transform import Transform
 from ..raster_names import file_name
-from ..rasters.grid import PointFunction, require_both_or_none
+from ..rasters.grid import FloatArray, Grid, PointFunction, require_both_or_none
 from ..rasters.pair import Image, ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import RasterSource
@@ -51,7 +53,8 @@ class Comparison:
         grid = pictures.overview_grid(pair.grid)
         bare = without_masks(pair)
         reference = bare.reference_patch(grid)
-        shown = {"reference": pictures.jpeg_uri(pictures.grey_picture(reference))}
+        seen = pictures.grey_picture(reference)
+        shown = {"reference": pictures.jpeg_uri(seen)}
         masks = {}
         if pair.reference.mask is not None:
             masks["reference"] = _tint(reference, pair.reference_patch(grid))
@@ -67,7 +70,7 @@ class Comparison:
             shown["reference"],
             shown["nominal"],
             shown.get("registered"),
-            pictures.jpeg_uri(pictures.backdrop(pictures.grey_picture(reference))),
+            pictures.jpeg_uri(pictures.backdrop(seen)),
             file_name(pair.reference.source.path),
             file_name(pair.input.source.path),
             grid.width,
@@ -101,10 +104,21 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
     """
     grid = reference.grid
     require_both_or_none(grid.crs, transform.crs, f"{reference.path} and the transform")
-    footprint = transform.inverse(transform.input_grid.outline())
     try:
-        common = covering_grid(grid, grid.to_own_map(footprint, transform.crs), within=True)
+        common = covering_grid(grid, _overlap(grid, transform), within=True)
     except NoOverlapError as error:
         raise NoOverlapError(f"{input.path}, as registered, misses {reference.path}") from error
     pair = ImagePair(Image(reference), Image(input), common, common.size, common)
     return Comparison.of(pair, transform.of_map(grid.crs))
+
+
+def _overlap(grid: Grid, transform: Transform) -> FloatArray:
+    """Return positions on a grid's map, (n, 2), that what it shows of an input lies between.
+
+    What of each outline the other shows: the input's own, of the whole Earth, folds where the grid
+    counts longitudes another way.
+    """
+    footprint = transform.inverse(transform.input_grid.outline())
+    own = grid.pixel_to_map(grid.outline())
+    shown = transform.input_grid.contains(transform.of_map(grid.crs)(own))
+    return np.concatenate([grid.to_own_map(footprint, transform.crs), own[shown]])

@@ -122,7 +122,7 @@ def matching_px(transform: Transform, reference: RasterSource | None) -> float:
     first, right, down = to_input(grid.pixel_to_map(middle + [[0, 0], [1, 0], [0, 1]]))
     sides = np.hypot(*np.subtract([right, down], first).T)
     # Where the middle lies nowhere, nothing is known.
-    return max(1.0, *sides[np.isfinite(sides)].tolist())
+    return float(sides[np.isfinite(sides)].max(initial=1.0))
 
 
 def measure_tie_points(

@@ -68,6 +68,38 @@ def fit_model(
     return PolynomialModel(kind, frame, coefficients)
 
 
+def require_determined(kind: str, xy: FloatArray) -> None:
+    """Raise an error if places do not determine a model: least squares would still make one.
+
+    Parameters
+    ----------
+    kind
+        One of `models.KINDS`.
+    xy
+        Places of the pairs, shape (n, 2).
+
+    Raises
+    ------
+    TooFewPointsError
+        All lie at one place, on a line, or on a curve of the polynomial's degree.
+    """
+    degree = DEGREE.get(kind, 1)
+    if len(xy) == 0 or degree == 0:
+        return
+    uv = Frame.around(xy).enter(xy)
+    if not uv.any():
+        raise TooFewPointsError(f"the {kind} model needs points that do not all lie at one place")
+    if kind not in ("rigid", "similarity") and _is_deficient(monomials(uv, degree)):
+        where = "a line" if degree == 1 else f"a curve of degree {degree}"
+        raise TooFewPointsError(f"the {kind} model needs points that do not all lie on {where}")
+
+
+def _is_deficient(design: FloatArray) -> bool:
+    """Return whether the columns of a matrix depend on one another."""
+    sizes = np.linalg.svd(design, compute_uv=False)
+    return bool(len(sizes) < design.shape[1] or sizes[-1] <= ROUNDING * sizes[0])
+
+
 def _solve(design: FloatArray, target: FloatArray, weights: FloatArray) -> FloatArray:
     root = np.sqrt(weights)[:, None]
     return np.asarray(np.linalg.lstsq(design * root, target * root, rcond=None)[0])
@@ -94,8 +126,7 @@ def _fit_thin_plate(
     """Smoothing thin-plate spline ([Wahba1990]): residuals weigh against bending."""
     count = len(uv)
     affine_part = monomials(uv, 1)
-    sizes = np.linalg.svd(affine_part, compute_uv=False)
-    if sizes[-1] <= ROUNDING * sizes[0]:
+    if _is_deficient(affine_part):
         raise TooFewPointsError("the tps model needs points that do not all lie on a line")
     stiffness = TPS_STIFFNESS * weights.mean() / weights
     system = np.zeros((count + 3, count + 3))

@@ -1,4 +1,4 @@
-"""Which numbers are the nodata value: those that GDAL takes for it."""
+"""Which numbers hold no data: those that GDAL takes for the nodata value, and no measurements."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 # Numbers that differ by less than this share of their sum, also of double precision, are the same
 # for GDAL: `ARE_REAL_EQUAL` of its gcore/gdal_priv.h. It meets values that were rounded as text.
 _TOLERANCE = 2 * np.finfo(np.float32).eps
+
+# ArcGIS fills pixels of floating-point numbers with it by default, and files lose the statement.
+_LOWEST = float(np.finfo(np.float32).min)
 
 
 @lru_cache
@@ -50,6 +53,20 @@ def is_nodata(values: NDArray[Any], nodata: float, dtype: np.dtype[Any]) -> NDAr
     if beyond.any():
         beyond &= values >= low if high < 0 else values <= high
     return beyond
+
+
+def are_measured(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which floating-point or complex values may be measurements, whatever a file states.
+
+    NaN and infinity are none, nor is what GDAL takes for the lowest number of single precision, nor
+    what lies below.
+    """
+    if values.dtype.kind == "c":
+        return np.asarray(np.isfinite(values))
+    # Also false where they are NaN.
+    measured = np.asarray(values > nodata_range(_LOWEST, values.dtype)[1])
+    measured &= values < np.inf
+    return measured
 
 
 def _last_same(own: Any, end: Any) -> Any:

@@ -18,7 +18,7 @@ from ..geometry.limits import SearchLimits
 from ..geometry.models import Model
 from ..geometry.transform import Transform
 from .colours import Colours
-from .grid import FloatArray, Grid, PointFunction, finite
+from .grid import FloatArray, Grid, PointFunction, crs_name, finite
 from .patch import Patch, empty_areas
 from .raster_masks import kept_on
 from .reading import FloatImage, Mask, RasterSource, Window
@@ -255,7 +255,7 @@ def make_pair(
     GeoreferencingError
         Only one of them is georeferenced.
     NoOverlapError
-        They do not overlap.
+        They do not overlap, or the map of one has no place for the other.
     """
     ref, inp = reference.source, input.source
     if ref.is_same_as(inp):
@@ -272,6 +272,12 @@ def make_pair(
     radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
     limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     outline = inp.grid.to_pixels_of(ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
+    if not len(finite(outline)):
+        maps = [crs_name(crs) for crs in (inp.grid.crs, ref.grid.crs) if crs is not None]
+        raise NoOverlapError(
+            f"{inp.path} lies nowhere on the map of {ref.path}: nothing leads there "
+            f"from {' to '.join(maps)}"
+        )
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if not limits.is_shift and not ref.grid.is_georeferenced:
         outline = outline + np.subtract(ref.grid.centre_px, inp.grid.centre_px)

@@ -30,6 +30,7 @@ from .metadata import (
     stated,
     tags_of,
 )
+from .nodata import are_measured
 from .remote_overviews import RemoteOverviews
 from .windows import FloatImage, Mask, Window, read_window
 
@@ -154,9 +155,9 @@ class RasterSource:
         values
             Shape `out_shape`, amplitudes for complex rasters; 0 where invalid.
         valid
-            Same shape; False for nodata, masked and transparent pixels, NaN, infinity and what
-            single precision cannot hold. A pixel of a reduced result is valid if half of its area
-            is; one of several bands if it is valid in all.
+            Same shape; False for nodata, masked and transparent pixels, NaN, infinity, the lowest
+            number of single precision and what that cannot hold. A pixel of a reduced result is
+            valid if half of its area is; one of several bands if it is valid in all.
 
         Raises
         ------
@@ -174,7 +175,11 @@ class RasterSource:
                     values = np.abs(values)
                 one = len(bands) == 1
                 image = values[0].astype(np.float32) if one else values.mean(0, np.float32)
-            return image, np.asarray(valid.all(axis=0) & np.isfinite(image))
+            known = np.asarray(valid.all(axis=0))
+            # Whole numbers are finite; one band of single precision was looked at as it was read.
+            if self.dtype.kind in "fc" and not (one and self.dtype == np.float32):
+                known &= are_measured(image)
+            return image, known
 
         if out_shape is None:
             values, valid = grey(self, window)
@@ -197,8 +202,9 @@ class RasterSource:
         """Read a window of several bands, each with its own validity.
 
         Like `read`, but values keep the raster's dtype (a reduced result is floating-point or
-        complex) and invalid pixels their values, except that NaN and infinity become 0. Both
-        results have the shape (bands, height, width). The alpha band is valid where it is not 0.
+        complex) and invalid pixels their values, except that NaN, infinity and the lowest number
+        become 0. Both results have the shape (bands, height, width). The alpha band is valid where
+        it is not 0.
         """
         bands = range(1, self.count + 1) if bands is None else bands
         for number in bands:

@@ -10,7 +10,7 @@ import rasterio.windows
 from numpy.typing import NDArray
 
 from .metadata import fits, numpy_dtype
-from .nodata import is_nodata
+from .nodata import are_measured, is_nodata
 
 if TYPE_CHECKING:
     from .reading import RasterSource
@@ -104,11 +104,12 @@ def _read(dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]) 
 def _validity(
     dataset: Any, source: RasterSource, place: Any, bands: Sequence[int], values: NDArray[Any]
 ) -> Mask:
-    """Return which of `values` are valid, and set those that are not finite to 0."""
+    """Return which of `values` are valid, and set those that can be no measurements to 0."""
     valid = np.ones(values.shape, bool)
     if values.dtype.kind in "fc":
-        valid = np.isfinite(values)
-        values[~valid] = 0
+        valid = are_measured(values)
+        if not valid.all():
+            values[~valid] = 0
     for i, number in enumerate(bands):
         if number == source.alpha_band:
             valid[i] = values[i] > 0

@@ -99,9 +99,10 @@ def svg_uri(figure: Figure) -> str:
 
 def shown_residuals(errors: PointErrors, grid: Grid) -> dict[str, Any]:
     """Return what a page shows of residuals: their map, and how exaggerated its arrows are."""
+    arrows = residual_arrows(errors, grid)
     return {
-        "map": svg_uri(residual_map(errors, grid)),
-        "exaggeration": residual_arrows(errors, grid).exaggeration,
+        "map": svg_uri(residual_map(errors, arrows, grid)),
+        "exaggeration": arrows.exaggeration,
     }
 
 
@@ -115,9 +116,8 @@ def shown_errors(
     }
 
 
-def residual_map(errors: PointErrors, grid: Grid) -> Figure:
+def residual_map(errors: PointErrors, arrows: Arrows, grid: Grid) -> Figure:
     """Draw the points and their exaggerated residuals; the figure's edges are the grid's."""
-    arrows = residual_arrows(errors, grid)
     axes = map_axes(grid)
     disagreeing = errors.check & ~errors.agreeing
     axes.plot(*errors.position_px[~errors.used].T, ".", color=REJECTED_COLOUR, ms=3.5)

@@ -43,7 +43,8 @@ def overview_grid(grid: Grid, longest_px: int = OVERVIEW_PX) -> Grid:
 def overview_positions(to_input_px: PointFunction, grid: Grid) -> PointFunction:
     """Return a fast stand-in for a transform, good to a fraction of an overview's pixel.
 
-    A spline with hundreds of knots would take longer than all the rest of the report.
+    A spline with hundreds of knots would take longer than all the rest of the report. Where there
+    is none, as where an input of the whole Earth ends and begins anew, it is the transform itself.
     """
     from scipy.interpolate import RectBivariateSpline
 
@@ -58,7 +59,11 @@ def overview_positions(to_input_px: PointFunction, grid: Grid) -> PointFunction:
         at = grid.map_to_pixel(xy)
         return np.column_stack([spline.ev(at[:, 1], at[:, 0]) for spline in splines])
 
-    return positions
+    between = [(nodes[1:] + nodes[:-1]) / 2 for nodes in (cols, rows)]
+    middles = grid.pixel_to_map(mesh(*between))
+    off_px = np.hypot(*(positions(middles) - to_input_px(middles)).T)
+    pixel = np.median(np.hypot(*(px[1:] - px[:-1]).T)) / (cols[1] - cols[0])
+    return positions if (off_px <= pixel).all() else to_input_px
 
 
 def grey_picture(patch: Patch) -> Picture:

@@ -17,7 +17,7 @@ from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
 from ..geometry.transform import Transform
 from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..rasters.grid import LON_LAT, Grid, reproject
 from .check_points import InputImage, RoofPoints, ground_points, roof_points
 from .held import PAIR_BYTES, require_memory
 from .misregistration import (
@@ -273,10 +273,25 @@ def _error_reach_px(options: PairOptions) -> int:
 
 
 def map_grid(options: SceneOptions) -> Grid:
-    """Return the grid of the SAR image of a scene."""
+    """Return the grid of the SAR image of a scene.
+
+    Raises
+    ------
+    ParameterError
+        The scene is larger than its map.
+    """
     px_m = options.pixel_size_m
     transform = Affine(px_m, 0, CORNER_M[0], 0, -px_m, CORNER_M[1])
-    return Grid(transform, CRS.from_epsg(CRS_EPSG), *options.size_px)
+    grid = Grid(transform, CRS.from_epsg(CRS_EPSG), *options.size_px)
+    outline = grid.pixel_to_map(grid.outline())
+    back = reproject(reproject(outline, grid.crs, LON_LAT), LON_LAT, grid.crs)
+    # Also false where it is not finite.
+    if not (np.abs(back - outline) < px_m).all():
+        raise ParameterError(
+            f"a scene of {grid.width} × {grid.height} px of {px_m:g} m is larger than its map: "
+            "take smaller pixels, or fewer"
+        )
+    return grid
 
 
 def scene_grid(grid: Grid, margin_px: int) -> Grid:

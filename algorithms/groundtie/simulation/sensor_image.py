@@ -249,6 +249,11 @@ def _rpcs(
 
     def fitted(px: FloatArray) -> RPCFit:
         lon_lat = reproject(camera.localise(px, heights), grid.crs, LON_LAT)
+        if not np.isfinite(lon_lat).all():
+            raise ParameterError(
+                f"the camera sees ground beyond the map: take pixels of less than "
+                f"{options.scene.pixel_size_m:g} m, or fewer"
+            )
         return fit_rpc(lon_lat, heights, nominal)
 
     # The error moves what is seen: RPCs with it see their image's pixels elsewhere.

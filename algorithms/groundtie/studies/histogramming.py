@@ -177,7 +177,7 @@ def measure_surface(
 
     Returns
     -------
-    Array of shape (2 radius + 1, 2 radius + 1).
+    Array of shape (2 radius + 1, 2 radius + 1); infinite where single precision cannot hold it.
     """
     margin = reach(order)
     span = search.shape[0] - template.shape[0] - 2 * margin + 1
@@ -196,7 +196,8 @@ def measure_surface(
         rows = context.map(measure, list(gpve_histograms(counted, order)))
     else:
         rows = context.map(one_by_one, range(span))
-    return np.array(list(rows), np.float32)
+    with np.errstate(over="ignore"):
+        return np.array(list(rows), np.float32)
 
 
 def _places(template: Bins, to_image: Affine) -> tuple[Bins, FloatArray, FloatArray]:

@@ -60,8 +60,10 @@ def tsallis_mutual_information(q: float) -> HistogramMeasure:
         return mutual_information
 
     def measure(histograms: Histograms) -> FloatArray:
-        a, b, ab = (np.exp(_log_power_sum(table, q)) for table in tables(histograms))
-        return np.asarray((a * b - ab) / (1 - q))
+        # Far from 1, powers are infinite, and the measure is no number.
+        with np.errstate(over="ignore", invalid="ignore"):
+            a, b, ab = (np.exp(_log_power_sum(table, q)) for table in tables(histograms))
+            return np.asarray((a * b - ab) / (1 - q))
 
     return measure
 

@@ -215,7 +215,7 @@ class SurfaceSettings:
             for patch in (reference, input)
         )
         inside = slice(radius + margin, -(radius + margin))
-        return measure_surface(
+        values = measure_surface(
             first[inside, inside],
             second,
             (first_count, second_count),
@@ -223,6 +223,13 @@ class SurfaceSettings:
             self.gpve_order,
             context,
         )
+        # Powers of shares: the surface would be flat, or infinite.
+        if self.similarity == "tsallis" and not (np.isfinite(values).all() and values.any()):
+            raise ParameterError(
+                f"Tsallis' entropy of order {self.entropy_order:g} has values here that are beyond "
+                "single precision: take an order nearer to 1"
+            )
+        return values
 
     @property
     def _measure(self) -> HistogramMeasure:

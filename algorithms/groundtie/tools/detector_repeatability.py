@@ -9,11 +9,12 @@ from typing import Annotated, Any
 
 from ..context import threads
 from ..declaration import file_lines, given_files, tool
-from ..errors import ParameterError
+from ..errors import NoOverlapError, ParameterError
 from ..geometry.transform import Transform, load_transform
 from ..kinds import Choice, FileIn, FileOut, Number, Text
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs, write_csv, write_json
+from ..rasters.grid import require_both_or_none
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch, middle_window
 from ..registration.opening import open_pair
@@ -164,6 +165,8 @@ def detector_repeatability(
         known = None
         if transform is not None:
             known = transform_of(load_transform(transform), pair.input.source, transform)
+            names = f"{pair.reference.source.path} and {transform}"
+            require_both_or_none(pair.grid.crs, known.crs, names)
         parts = None
         if opened.pair.is_masked:
             reference_part, input_part = _read(opened.pair, known, size)
@@ -191,13 +194,21 @@ def _read(pair: ImagePair, transform: Transform | None, largest: int) -> tuple[P
     grid = pair.grid
     piece = grid.window(*middle_window(grid, largest))
     reference = pair.reference_patch(piece)
-    input = pair.input_patch(piece, pair.nominal_px if transform is None else transform)
-    return reference, input
+    to_px = pair.nominal_px if transform is None else transform.of_map(grid.crs)
+    return reference, pair.input_patch(piece, to_px)
 
 
 def _both_valid(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
-    """Return two patches without what one shows alone: features there cannot repeat."""
+    """Return two patches without what one shows alone: features there cannot repeat.
+
+    Raises
+    ------
+    NoOverlapError
+        They show nothing together.
+    """
     both = reference.valid & input.valid
+    if not both.any():
+        raise NoOverlapError("where the images overlap nominally, they show nothing together")
     return Patch(reference.values, both), Patch(input.values, both)
 
 
