@@ -100,7 +100,7 @@ class RepairPage(QWidget):
     def _enable(self) -> None:
         for widget in (self.drag, self.add, self.match, self.model):
             widget.setEnabled(self.review is not None)
-        self.write.setEnabled(bool(self.fits))
+        self.write.setEnabled(bool(self.fits) and self.writer.run is None)
 
     def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
         """Take the ground control of an image with RPCs, which `ortho` shows on the map."""
@@ -268,12 +268,12 @@ class RepairPage(QWidget):
         if refusal := self.writer.start(self.review, fit, *layers, self._sensor):
             self.text.setText(tr("Not written: {}.").format(refusal))
             return
-        self.write.setEnabled(False)
+        self._enable()
 
     def _end_writing(self, outcome: Outcome) -> None:
+        self._enable()
         if self.review is None:
             return  # One of the layers was taken out of the project meanwhile.
-        self.write.setEnabled(True)
         if not outcome.succeeded:
             self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))
             return

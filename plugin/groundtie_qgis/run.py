@@ -114,6 +114,8 @@ class Run:
             self._algorithm, self._values, self._context, self._feedback
         )
         self._task.executed.connect(self._end)
+        # The task uses context and feedback, which it does not keep: without them QGIS crashes.
+        self._task.setProperty("run", self)
         QgsApplication.taskManager().addTask(self._task)
 
     def cancel(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -68,6 +69,28 @@ def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path:
     # The input is the reference's negative: where it lies right they are opposite.
     assert np.corrcoef(one.ravel(), other.ravel())[0, 1] < -0.9
     desktop.picture("6_written")
+
+
+def test_an_image_is_written_once_while_points_change(desktop: Desktop, dock: Any) -> None:
+    repair = dock.repair
+    repair.write.click()
+    repair.change(repair.review.switch([0], False))
+    assert repair.writer.run is not None
+    assert not repair.write.isEnabled()
+    desktop.wait(lambda: repair.writer.run is None)
+    assert repair.text.text().startswith("Written: "), repair.text.text()
+    assert repair.write.isEnabled()
+
+
+def test_a_run_that_nobody_keeps_comes_to_its_end(desktop: Desktop, dock: Any) -> None:
+    """Its task uses what it owns: QGIS would crash."""
+    done: list[Any] = []
+    dock.repair.writer._done = done.append
+    dock.repair.write.click()
+    dock.repair.writer.run = None
+    gc.collect()
+    desktop.wait(lambda: bool(done))
+    assert done[0].succeeded, done[0].reason
 
 
 def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(dock: Any) -> None:
