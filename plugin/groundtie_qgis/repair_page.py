@@ -27,6 +27,7 @@ from .point_table import PointTable, PointView
 from .reference_export import any_of, between, layer_of
 from .run import Outcome
 from .sensor_run import SensorImage
+from .start_files import file_name
 from .translation import tr
 from .writer import Writer
 
@@ -108,10 +109,10 @@ class RepairPage(QWidget):
         files, dem = outcome.files, image.dem
         with rasterio_env():
             opened = review.of_sensor_image(
-                reference.source(),
-                image.layer.source(),
+                file_name(reference),
+                file_name(image.layer),
                 files["RPC"],
-                None if dem is None else Path(dem.source()),
+                None if dem is None else Path(file_name(dem)),
                 None if dem is None else image.datum,
                 files["TIE_POINTS"],
             )
@@ -124,9 +125,9 @@ class RepairPage(QWidget):
         self._reference, self._input, self._sensor = reference, input, None
         with rasterio_env():
             if path is not None:
-                opened = review.Review.open(path, input.source())
+                opened = review.Review.open(path, file_name(input))
             else:
-                opened = review.without_points(reference.source(), input.source())
+                opened = review.without_points(file_name(reference), file_name(input))
         self.change(opened, "affine")
         self.text.setText(self._summary() if path is not None else tr(FIRST_POINTS))
 
@@ -250,7 +251,7 @@ class RepairPage(QWidget):
             fit = self.fits.get(self.kind())
             transform = self.review.nominal if fit is None else fit.transform
             seen = self._input if self._sensor is None else self._sensor.layer
-            images = self._reference.source(), seen.source()
+            images = file_name(self._reference), file_name(seen)
             try:
                 with rasterio_env():
                     input_px, peak = review.refine_click(*images, reference_xy, input_px, transform)

@@ -8,6 +8,7 @@ from typing import Any
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QLabel
 
+from .start_files import file_name
 from .translation import tr
 from .wording import in_words
 
@@ -28,7 +29,7 @@ class VerdictLabel(QLabel):
         """Show a verdict; files of `layers` are named as these are."""
         heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in layers:
-            text = text.replace(layer.source(), layer.name())
+            text = text.replace(file_name(layer), layer.name())
         lines = html.escape(in_words(text, None)).split("\n")
         self.setText(
             f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'

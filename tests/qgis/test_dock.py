@@ -6,6 +6,7 @@ Pictures of every step are left in the folder that GROUNDTIE_PICTURES names.
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,37 @@ def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -
     desktop.picture("3_swipe")
     dock.look.swipe.click()
     assert not dock.overlay.isVisible()
+
+
+@pytest.mark.parametrize("way", ["options", "archive"])
+def test_layers_of_archives_and_with_options(desktop: Desktop, tmp_path: Path, way: str) -> None:
+    from groundtie_qgis import search
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    write_pair(tmp_path, 0)
+    archive = tmp_path / "a pair ö.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        for name in ("reference", "input"):
+            file.write(tmp_path / f"{name}.tif", f"b/{name}.tif")
+    place = {"options": f"{tmp_path}/{{}}.tif|option:NUM_THREADS=2"}.get(
+        way, f"/vsizip/{archive}/b/{{}}.tif"
+    )
+    layers = [QgsRasterLayer(place.format(name), name) for name in ("reference", "input")]
+    for layer in layers:
+        QgsProject.instance().addMapLayer(layer)
+    desktop.canvas.setExtent(layers[0].extent())
+    dock = desktop.open()
+    assert search.usual_radius_m("register", *layers) == 100
+    dock.start.pair.setCurrentIndex(dock.start.pair.findData("coregister"))
+    dock.start.radius.setValue(12)
+    outcome = desktop.register()
+    assert outcome.succeeded, outcome.reason
+    repair = dock.repair
+    assert len(repair.review.points) > 0, repair.text.text()
+    count = len(repair.review.points)
+    repair.add_point(repair.review.points.reference_xy[0], repair.review.points.input_px[0])
+    assert len(repair.review.points) == count + 1
+    assert repair.review.points.score[-1] > 5
 
 
 def test_looking_goes_from_place_to_place(
