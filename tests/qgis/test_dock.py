@@ -271,10 +271,14 @@ def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
     assert "Choose two raster layers" in start.verdict.text()
 
 
+@pytest.mark.parametrize("rotation_deg", [0, 30])
 def test_swipe_shows_the_registered_image_whatever_lies_above_it(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path], rotation_deg: float
 ) -> None:
     dock = open_registered(tmp_path, desktop, registered_files)
+    desktop.canvas.setRotation(rotation_deg)
+    corner = dock.repair.points.pos()
+    assert corner.manhattanLength() < 1e-6  # Points are painted in the map's pixels.
     dock.tabs.setCurrentWidget(dock.look)
     # The input lies above: its corner, where it is not registered to, is what the map shows.
     desktop.canvas.setLayers([dock.repair._input])
