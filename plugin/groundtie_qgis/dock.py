@@ -47,7 +47,6 @@ class GroundTieDock(QDockWidget):
         self.setAllowedAreas(
             Qt.DockWidgetArea.LeftDockWidgetArea | Qt.DockWidgetArea.RightDockWidgetArea
         )
-        self._canvas = canvas
         QgsProject.instance().layersWillBeRemoved.connect(self._forget)
 
     def _turn_to(self, _: int) -> None:
@@ -102,5 +101,5 @@ class GroundTieDock(QDockWidget):
         """Remove what was drawn on the map, and the connections (for unloading)."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
         self.look.take_away()
+        self.repair.take_away()
         self.overlay.take_away()
-        self._canvas.scene().removeItem(self.repair.points)

@@ -61,7 +61,7 @@ class RepairPage(QWidget):
         self.fits: dict[str, Any] = {}
         self._reference: Any = None
         self._input: Any = None
-        self._clicked: QgsPointXY | None = None
+        self._clicked: tuple[float, float] | None = None
         self.writer = Writer(self._end_writing)
         # What an image with RPCs is, which then is written in place of the input.
         self._sensor: SensorImage | None = None
@@ -69,6 +69,7 @@ class RepairPage(QWidget):
         self._drag = DragTool(canvas, self.points, self._moved_on_map, self._choose)
         self._click = ClickTool(canvas, self._clicked_on_map)
         self._build()
+        canvas.destinationCrsChanged.connect(self._show_fit)
 
     def _build(self) -> None:
         self.text = QLabel(tr("Register two images first."))
@@ -147,6 +148,12 @@ class RepairPage(QWidget):
         """Return whether the points belong to one of the layers with these ids."""
         image = () if self._sensor is None else (self._sensor.layer, self._sensor.dem)
         return any_of(ids, self._reference, self._input, *image)
+
+    def take_away(self) -> None:
+        """Take what this draws from the map for good."""
+        self.stop()
+        self._canvas.destinationCrsChanged.disconnect(self._show_fit)
+        self._canvas.scene().removeItem(self.points)
 
     def stop(self) -> None:
         """Leave the map to others."""
@@ -233,7 +240,7 @@ class RepairPage(QWidget):
 
     def _clicked_on_map(self, place: QgsPointXY) -> None:
         if self._clicked is None:
-            self._clicked = place
+            self._clicked = self._on_reference(place)
             self._overlay.show_layers([clearly(self._input)])
             self.text.setText(
                 tr("Shown is the input where its own georeferencing has it: click there.")
@@ -241,7 +248,7 @@ class RepairPage(QWidget):
             return
         first, self._clicked = self._clicked, None
         self._overlay.show_layers([clearly(self._reference)])
-        self.add_point(self._on_reference(first), self.review.input_px(self._on_reference(place)))
+        self.add_point(first, self.review.input_px(self._on_reference(place)))
 
     def add_point(self, reference_xy: Any, input_px: Any) -> None:
         """Add a point, where similarity refines it if that is asked for."""

@@ -149,6 +149,27 @@ def test_two_thousand_points_are_fitted_once_for_each_drag(
     print(f"a drag of one of {count} points: {min(seconds):.3f} s of processor")
 
 
+def test_points_go_with_a_map_whose_crs_changes(desktop: Desktop, dock: Any) -> None:
+    from groundtie_qgis.reference_export import between
+    from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY
+
+    repair = dock.repair
+    place = QgsPointXY(ORIGIN[0] + 200, ORIGIN[1] - 180)
+    repair.match.setChecked(False)
+    repair.add.click()
+    repair._clicked_on_map(place)
+    web = QgsCoordinateReferenceSystem("EPSG:3857")
+    to_web = between(desktop.canvas.mapSettings().destinationCrs(), web)
+    desktop.canvas.setDestinationCrs(web)
+    repair._clicked_on_map(to_web.transform(place))
+    xy = repair.review.points.reference_xy
+    np.testing.assert_allclose(xy[-1], [place.x(), place.y()], atol=1e-3)
+    worst = repair.review.worst(repair.fits[repair.kind()].residuals_px)[0]
+    for index, seen in ((0, repair.points.rows[0][1]), (worst, dock.look._worst[0])):
+        expected = to_web.transform(QgsPointXY(*xy[index]))
+        assert expected.distance(seen) < 1e-3
+
+
 def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) -> None:
     from qgis.core import QgsPointXY
 
