@@ -294,9 +294,16 @@ class RepairPage(QWidget):
 
     def _on_map(self, places: Any) -> list[QgsPointXY]:
         transform = between(self._crs(), self._canvas.mapSettings().destinationCrs())
-        return [transform.transform(QgsPointXY(x, y)) for x, y in places.tolist()]
+        drawn = (places + 0.5) * [1, -1] if self._is_on_pixels() else places
+        return [transform.transform(QgsPointXY(x, y)) for x, y in drawn.tolist()]
 
     def _on_reference(self, place: QgsPointXY) -> tuple[float, float]:
         transform = between(self._canvas.mapSettings().destinationCrs(), self._crs())
         found = transform.transform(place)
-        return found.x(), found.y()
+        x, y = found.x(), found.y()
+        return (x - 0.5, -y - 0.5) if self._is_on_pixels() else (x, y)
+
+    def _is_on_pixels(self) -> bool:
+        """Whether positions are pixels: QGIS draws them downwards from 0, centres at halves."""
+        review = self.review
+        return review.points.crs is None and not review.input_grid.is_georeferenced

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 from desktops import Desktop, drag, open_registered
-from noise_pairs import ORIGIN, SHIFT
+from noise_pairs import ORIGIN, SHIFT, write_raster
 
 
 @pytest.fixture
@@ -168,6 +168,28 @@ def test_points_go_with_a_map_whose_crs_changes(desktop: Desktop, dock: Any) -> 
     for index, seen in ((0, repair.points.rows[0][1]), (worst, dock.look._worst[0])):
         expected = to_web.transform(QgsPointXY(*xy[index]))
         assert expected.distance(seen) < 1e-3
+
+
+def test_points_of_images_without_georeferencing(desktop: Desktop, tmp_path: Path) -> None:
+    """They lie on the images, which QGIS draws below y = 0, from the corner of the first pixel."""
+    from qgis.core import QgsPointXY
+
+    ground = np.random.Generator(np.random.PCG64(0)).uniform(1, 254, (1, 64, 64))
+    for name in ("reference", "input"):
+        write_raster(tmp_path / f"{name}.tif", ground, None)
+    images = desktop.load(tmp_path, "reference", "input")
+    repair = desktop.open().repair
+    repair.open(*images, None)
+    repair.match.setChecked(False)
+    repair.add.click()
+    for place in (QgsPointXY(20.5, -10.5), QgsPointXY(24.5, -13.5)):
+        assert images[0].extent().contains(place)
+        repair._clicked_on_map(place)
+    points = repair.review.points
+    np.testing.assert_allclose(points.reference_xy, [[20, 10]])
+    np.testing.assert_allclose(points.input_px, [[24, 13]])
+    nominal, place = repair.points.rows[0][:2]
+    assert (nominal, place) == (QgsPointXY(24.5, -13.5), QgsPointXY(20.5, -10.5))
 
 
 def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) -> None:
