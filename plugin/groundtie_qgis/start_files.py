@@ -26,7 +26,10 @@ def has_rpcs(layer: Any) -> bool:
 
     if layer is None or layer.providerType() != "gdal":
         return False
-    dataset = gdal.Open(file_name(layer))
+    try:
+        dataset = gdal.Open(file_name(layer))
+    except RuntimeError:  # Another plugin may have GDAL raise where a file is gone.
+        return False
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
         return False
     return bool(dataset.GetMetadata("RPC"))

@@ -355,6 +355,24 @@ def test_layers_that_go_during_a_run_do_no_harm(desktop: Desktop, tmp_path: Path
     assert not desktop.dock.look.swipe.isEnabled()
 
 
+def test_the_dock_opens_beside_a_layer_whose_file_is_gone(desktop: Desktop, tmp_path: Path) -> None:
+    """Also where another plugin has GDAL raise errors."""
+    from osgeo import gdal
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    gone = QgsRasterLayer(str(tmp_path / "gone.tif"), "gone")
+    QgsProject.instance().addMapLayer(gone)
+    raised = gdal.GetUseExceptions()
+    gdal.UseExceptions()
+    try:
+        assert desktop.dock is None
+        desktop.dock = desktop._dock(desktop.iface)
+    finally:
+        if not raised:
+            gdal.DontUseExceptions()
+    assert desktop.dock.start.heights.isHidden()
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
