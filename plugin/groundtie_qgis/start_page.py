@@ -225,7 +225,9 @@ class StartPage(QWidget):
 
     def _end(self, outcome: Outcome) -> None:
         self._run, self.outcome = None, outcome
-        if any(layer is not None and sip.isdeleted(layer) for layer in self._layers):
+        heights = () if self.sensor is None else (self.sensor.dem,)
+        layers = (*self._layers, *heights)
+        if any(layer is not None and sip.isdeleted(layer) for layer in layers):
             self._layers = ()  # Taken out of the project meanwhile.
         self.register.setText(tr("Register"))
         self.progress.hide()

@@ -373,6 +373,52 @@ def test_the_dock_opens_beside_a_layer_whose_file_is_gone(desktop: Desktop, tmp_
     assert desktop.dock.start.heights.isHidden()
 
 
+@pytest.mark.parametrize("name", ["dem", "image"])
+def test_layers_that_go_while_rpcs_are_refined(
+    desktop: Desktop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    from groundtie_qgis import sensor_run
+    from groundtie_qgis.run import Outcome, Run
+    from qgis.core import QgsProject
+
+    refining: list[Any] = []
+
+    class Refining(Run):
+        def start(self) -> None:
+            if refining:  # What comes next is the orthoimage, of a layer that is gone.
+                super().start()
+            refining.append(self)
+
+    monkeypatch.setattr(sensor_run, "Run", Refining)
+    make_scene(tmp_path, None)
+    reference, image, dem = desktop.load(tmp_path, "reference", "image", "dem")
+    start = desktop.open().start
+    start.reference.setLayer(reference)
+    start.input.setLayer(image)
+    start.dem.setLayer(dem)
+    start.register.click()
+    (first,) = refining
+    first._files["REPORT"].write_text("refined", encoding="utf-8")
+    QgsProject.instance().removeMapLayer({"dem": dem, "image": image}[name].id())
+    first._done(Outcome(True, files=first._files))
+    assert start._run is None
+    assert start.register.text() == "Register"
+    assert "Not registered" in start.verdict.text()
+
+
+def test_layers_that_go_after_a_refusal_do_no_harm(
+    desktop: Desktop, tmp_path: Path, asked: list[tuple[str, dict[str, Any]]]
+) -> None:
+    from qgis.core import QgsProject
+
+    pair(tmp_path, desktop)
+    start = desktop.open().start
+    desktop.register()
+    QgsProject.instance().clear()
+    start.choose_bands()
+    assert start.bands.isVisible()
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
