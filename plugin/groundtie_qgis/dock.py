@@ -59,19 +59,20 @@ class GroundTieDock(QDockWidget):
             self.repair.stop()
 
     def _registered(self, outcome: Outcome, reference: Any, input: Any) -> None:
-        """Go on with what came of a registration."""
+        """Go on with what came of a registration; one that was cancelled changes nothing."""
+        if not (outcome.succeeded or outcome.files.get("REPORT")):
+            return
         registered = layer_of(outcome.files.get("OUTPUT"))
         self.look.show_pair(reference, registered)
-        if outcome.succeeded or outcome.files.get("REPORT"):
-            try:
-                points = outcome.files.get("TIE_POINTS")
-                if self.start.sensor is None:
-                    self.repair.open(reference, input, points)
-                elif points is not None:
-                    self.repair.open_sensor(reference, registered, self.start.sensor, outcome)
-            except errors.GroundTieError as error:
-                self.repair.close_points()
-                self.repair.text.setText(error.one_line())
+        try:
+            points = outcome.files.get("TIE_POINTS")
+            if self.start.sensor is None:
+                self.repair.open(reference, input, points)
+            elif points is not None:
+                self.repair.open_sensor(reference, registered, self.start.sensor, outcome)
+        except errors.GroundTieError as error:
+            self.repair.close_points()
+            self.repair.text.setText(error.one_line())
 
     def _written(self, reference: Any, layer: Any) -> None:
         self.look.show_pair(reference, layer)

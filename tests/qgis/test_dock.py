@@ -419,6 +419,20 @@ def test_layers_that_go_after_a_refusal_do_no_harm(
     assert start.bands.isVisible()
 
 
+def test_a_run_that_is_cancelled_changes_nothing(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    shown = dock.look._registered
+    dock.start.register.click()
+    dock.start.register.click()  # it is Cancel now
+    desktop.wait(lambda: dock.start._run is None)
+    assert "cancelled" in dock.start.verdict.text()
+    assert dock.look._registered is shown
+    assert dock.look.swipe.isEnabled()
+    assert len(dock.repair.review.points) > 0
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
