@@ -12,8 +12,8 @@ from qgis.core import (
     QgsProject,
     QgsRasterLayer,
 )
-from qgis.PyQt.QtCore import QSize
-from qgis.PyQt.QtGui import QImage
+from qgis.PyQt.QtCore import QSize, Qt
+from qgis.PyQt.QtGui import QColor, QImage
 
 from .dependencies import rasterio_env
 from .run import new_file
@@ -64,6 +64,7 @@ def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
     settings.setLayers(layers)
     settings.setDestinationCrs(input.crs())
     settings.setTransformContext(QgsProject.instance().transformContext())
+    settings.setBackgroundColor(QColor(Qt.GlobalColor.transparent))
     settings.setOutputDpi(96)
     settings.setOutputSize(size)
     settings.setExtent(extent)
@@ -84,7 +85,7 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
     bits = image.constBits()
     bits.setsize(image.bytesPerLine() * height)
     pixels = np.frombuffer(bits, np.uint8).reshape(height, -1)[:, : 4 * width]
-    bands = pixels.reshape(height, width, 4).transpose(2, 0, 1)[:3]
+    *bands, opacity = pixels.reshape(height, width, 4).transpose(2, 0, 1)
     edges = extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
     profile = {
         "driver": "GTiff",
@@ -96,7 +97,8 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
         "transform": from_bounds(*edges, width, height),
     }
     with rasterio_env(), rasterio.open(path, "w", **profile) as raster:
-        raster.write(bands)
+        raster.write(np.stack(bands))
+        raster.write_mask(opacity > 0)  # Where no layer draws there is no ground.
 
 
 def between(source: Any, target: Any) -> QgsCoordinateTransform:
