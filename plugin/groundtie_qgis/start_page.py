@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from qgis.core import QgsProviderRegistry
 from qgis.gui import QgsMapLayerComboBox
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QTimer, QUrl
@@ -67,7 +68,7 @@ class StartPage(QWidget):
         self.propose()
 
     def _build(self) -> None:
-        self.reference, self.input = _raster_box(), _raster_box()
+        self.reference, self.input = _raster_box(), _raster_box(files=True)
         self.reference.setAdditionalItems([tr(MAP)])
         self.pair = QComboBox()
         for tool, text in PAIRS.items():
@@ -78,7 +79,7 @@ class StartPage(QWidget):
         self.radius.setSuffix(" m")
         self.radius.setSpecialValueText(tr("usual"))
         self.rotated = QCheckBox(tr("rotation unknown"))
-        self.dem = _raster_box()
+        self.dem = _raster_box(files=True)
         self.dem.setAllowEmptyLayer(True)
         self.dem.setLayer(None)
         self.datum = QComboBox()
@@ -289,7 +290,10 @@ class StartPage(QWidget):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
-def _raster_box() -> QgsMapLayerComboBox:
+def _raster_box(files: bool = False) -> QgsMapLayerComboBox:
     box = QgsMapLayerComboBox()
     box.setFilters(RASTER_LAYERS)
+    if files:
+        providers = QgsProviderRegistry.instance().providerList()
+        box.setExcludedProviders([name for name in providers if name != "gdal"])
     return box

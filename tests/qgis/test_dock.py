@@ -433,6 +433,25 @@ def test_a_run_that_is_cancelled_changes_nothing(
     assert len(dock.repair.review.points) > 0
 
 
+def test_what_is_no_file_is_no_input(desktop: Desktop, tmp_path: Path) -> None:
+    """A web map as the input would be drawn as a whole, the Earth, before it is refused."""
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    pair(tmp_path, desktop)
+    source = "type=xyz&url=file:///nowhere/{z}/{x}/{y}.png&zmin=1&zmax=16"
+    QgsProject.instance().addMapLayer(QgsRasterLayer(source, "web", "wms"))
+    start = desktop.open().start
+    offered = {
+        name: [box.itemText(index) for index in range(box.count())]
+        for name, box in (
+            ("reference", start.reference),
+            ("input", start.input),
+            ("dem", start.dem),
+        )
+    }
+    assert {name for name, texts in offered.items() if "web" in texts} == {"reference"}
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
