@@ -64,12 +64,15 @@ class StartPage(QWidget):
         self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
+        # In a project without layers the map stands in the box without being chosen.
+        self._chose_map = False
         self._build()
         self.propose()
 
     def _build(self) -> None:
         self.reference, self.input = _raster_box(), _raster_box(files=True)
         self.reference.setAdditionalItems([tr(MAP)])
+        self.reference.activated.connect(self._note_choice)
         self.pair = QComboBox()
         for tool, text in PAIRS.items():
             self.pair.addItem(tr(text), tool)
@@ -132,12 +135,17 @@ class StartPage(QWidget):
 
     def propose(self) -> None:
         """Fill boxes that hold the same, or nothing, with two rasters of the project."""
+        if self._chose_map and self._from_map():
+            return
         if self.reference.currentLayer() not in (None, self.input.currentLayer()):
             return
         reference, input = proposed_pair(raster_files())
         if reference is not None and input is not None:
             self.reference.setLayer(reference)
             self.input.setLayer(input)
+
+    def _note_choice(self, _: int) -> None:
+        self._chose_map = self._from_map()
 
     def _note_change(self, box: Any) -> None:
         self._changed = box

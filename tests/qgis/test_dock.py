@@ -452,6 +452,24 @@ def test_what_is_no_file_is_no_input(desktop: Desktop, tmp_path: Path) -> None:
     assert {name for name, texts in offered.items() if "web" in texts} == {"reference"}
 
 
+def test_the_map_stays_chosen_when_the_dock_is_shown_again(
+    desktop: Desktop, tmp_path: Path
+) -> None:
+    dock = desktop.open()
+    box = dock.start.reference
+    chosen = box.currentText()
+    assert chosen == "The map as it is drawn"  # There is nothing else; nobody chose it.
+    pair(tmp_path, desktop)
+    dock.hide()
+    dock.show()
+    assert box.currentText() == "reference"
+    box.setCurrentIndex(box.findText(chosen))
+    box.activated.emit(box.currentIndex())
+    dock.hide()
+    dock.show()
+    assert box.currentText() == chosen
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
