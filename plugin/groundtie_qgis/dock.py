@@ -101,6 +101,7 @@ class GroundTieDock(QDockWidget):
     def take_away(self) -> None:
         """Remove what was drawn on the map, and the connections (for unloading)."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
+        self.start.take_away()
         self.look.take_away()
         self.repair.take_away()
         self.overlay.take_away()

@@ -152,6 +152,8 @@ class RepairPage(QWidget):
     def take_away(self) -> None:
         """Take what this draws from the map for good."""
         self.stop()
+        if self.writer.run is not None:
+            self.writer.run.cancel()
         self._canvas.destinationCrsChanged.disconnect(self._show_fit)
         self._canvas.scene().removeItem(self.points)
 

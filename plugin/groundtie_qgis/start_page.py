@@ -198,6 +198,11 @@ class StartPage(QWidget):
         self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
         self._run.start()
 
+    def take_away(self) -> None:
+        """Stop what runs (for unloading)."""
+        if self._run is not None:
+            self._run.cancel()
+
     def _begin(self) -> None:
         self.sensor = None
         self.register.setText(tr("Cancel"))

@@ -470,6 +470,24 @@ def test_the_map_stays_chosen_when_the_dock_is_shown_again(
     assert box.currentText() == chosen
 
 
+def test_what_is_unloaded_leaves_nothing_behind(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.PyQt.QtWidgets import QShortcut
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    dock.repair.drag.click()
+    dock.repair.write.click()
+    dock.start.register.click()
+    dock.take_away()
+    desktop.dock = None
+    assert desktop.canvas.mapTool() is None
+    assert desktop.canvas.findChildren(QShortcut) == []
+    desktop.wait(lambda: dock.start._run is dock.repair.writer.run is None)
+    assert "cancelled" in dock.start.outcome.reason
+    assert "cancelled" in dock.repair.writer.outcome.reason
+
+
 def write_exact_control(scene: Scene, path: Path) -> Path:
     """Write places of an image with RPCs where they truly are on the map."""
     from groundtie.review import of_sensor_image
