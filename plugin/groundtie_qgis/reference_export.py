@@ -17,6 +17,8 @@ from qgis.PyQt.QtGui import QColor, QImage
 
 from .dependencies import rasterio_env
 from .run import new_file
+from .start_files import file_name
+from .styling import MADE_FROM
 from .translation import mark
 
 MAP = mark("The map as it is drawn")
@@ -32,18 +34,23 @@ def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, 
     Parameters
     ----------
     reference
-        A raster layer; None: the map as it is drawn, without the input.
+        A raster layer; None: the map as it is drawn, without the input and what was made from it.
     input
         The raster layer to be registered.
     canvas
         The map.
     """
     if reference is None:
-        layers = [layer for layer in canvas.layers() if layer != input]
+        layers = [layer for layer in canvas.layers() if not _shows(layer, input)]
         reference = drawn(layers, input, "map")
     elif reference.providerType() != "gdal":
         reference = drawn([reference], input, reference.name())
     return reference, {"REFERENCE": named(reference), "INPUT": named(input)}
+
+
+def _shows(layer: Any, raster: Any) -> bool:
+    """Return whether a layer shows a raster: it would be registered to itself."""
+    return file_name(raster) in (file_name(layer), layer.customProperty(MADE_FROM))
 
 
 def named(layer: Any) -> str:

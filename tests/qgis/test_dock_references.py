@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,6 +46,29 @@ def test_where_no_layer_draws_there_is_no_ground(desktop: Desktop, tmp_path: Pat
         first, last = (drawn.index(ORIGIN[0] + x, ORIGIN[1] - y) for x, y in ((3, 3), (197, 380)))
         assert mask[first[0] : last[0], first[1] : last[1]].all()
         assert not mask[:, drawn.index(ORIGIN[0] + 203, ORIGIN[1])[1] :].any()
+
+
+def test_the_map_shows_nothing_of_the_input(
+    desktop: Desktop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither in another layer, nor registered: it would be registered to itself."""
+    from groundtie_qgis import reference_export
+    from qgis.core import QgsProject
+
+    reference, input = pair(tmp_path, desktop)
+    start = desktop.open().start
+    start.pair.setCurrentIndex(start.pair.findData("coregister"))
+    start.radius.setValue(12)
+    assert desktop.register().succeeded
+    desktop.load(tmp_path, "input")
+    assert len(QgsProject.instance().mapLayers()) == 4
+    desktop.refresh()
+    drawn: list[Any] = []
+    monkeypatch.setattr(
+        reference_export, "drawn", lambda layers, *_: [drawn.extend(layers), reference][1]
+    )
+    reference_export.with_files(None, input, desktop.canvas)
+    assert drawn == [reference]
 
 
 ZOOM, TILES = 16, 3
