@@ -139,8 +139,10 @@ class ToolAlgorithm(NamedAlgorithm):
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
         # A batch in which rows failed ran to its end, but not to a good one.
         bad = getattr(result, "exit_code", 0) != 0
+        # The dock tells results from steps.
+        told = getattr(feedback, "pushResult", feedback.pushInfo)
         for line in result.lines():
-            feedback.reportError(line) if bad else feedback.pushInfo(line)
+            feedback.reportError(line) if bad else told(line)
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 

@@ -250,7 +250,7 @@ class StartPage(QWidget):
         refused = not outcome.succeeded and report is not None
         self.tries.offer(self._worth_a_try() if refused else ())
         if outcome.succeeded:
-            self._state(True, "\n".join(first_lines(outcome.lines)))
+            self._state(True, first_lines(outcome.lines))
         else:
             self._state(False, outcome.reason)
         if self._layers:

@@ -51,6 +51,7 @@ def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -
     assert outcome.succeeded, outcome.reason
     assert "Accepted" in dock.start.verdict.text()
     assert "<p>correction: 5.0 px (5.0 m)" in dock.start.verdict.text()
+    assert outcome.lines[0].startswith("correction: ")  # Steps are no results.
     assert dock.start.report.isVisible()
     assert not dock.start.tries.wider.isVisible()
     desktop.picture("2_verdict")
