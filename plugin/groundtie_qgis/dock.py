@@ -66,7 +66,9 @@ class GroundTieDock(QDockWidget):
         self.look.show_pair(reference, registered)
         try:
             points = outcome.files.get("TIE_POINTS")
-            if self.start.sensor is None:
+            if points is None and self.repair.has_points_of(reference, input):
+                pass  # A refusal brings none: those that a person has edited stay.
+            elif self.start.sensor is None:
                 self.repair.open(reference, input, points)
             elif points is not None:
                 self.repair.open_sensor(reference, registered, self.start.sensor, outcome)

@@ -157,6 +157,11 @@ class RepairPage(QWidget):
         self._canvas.destinationCrsChanged.disconnect(self._show_fit)
         self._canvas.scene().removeItem(self.points)
 
+    def has_points_of(self, reference: Any, input: Any) -> bool:
+        """Return whether there are points between two layers."""
+        mine = self._reference is reference and self._input is input
+        return mine and self.review is not None and len(self.review.points) > 0
+
     def stop(self) -> None:
         """Leave the map to others."""
         self.drag.setChecked(False)

@@ -420,6 +420,24 @@ def test_layers_that_go_after_a_refusal_do_no_harm(
     assert start.bands.isVisible()
 
 
+def test_a_refusal_takes_no_edited_points_away(
+    desktop: Desktop,
+    tmp_path: Path,
+    registered_files: dict[str, Path],
+    asked: list[tuple[str, dict[str, Any]]],
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair, start = dock.repair, dock.start
+    repair.change(repair.review.switch([0], False))
+    start.reference.setLayer(repair._reference)
+    start.input.setLayer(repair._input)
+    desktop.wait(lambda: not start._apart.isActive())
+    desktop.register()
+    assert asked
+    assert not repair.review.points.used[0]
+    assert repair.write.isEnabled()
+
+
 def test_a_run_that_is_cancelled_changes_nothing(
     desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
 ) -> None:
