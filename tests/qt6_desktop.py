@@ -30,7 +30,7 @@ class Rectangle:
 class Canvas(QtWidgets.QGraphicsView):
     """Stands for `QgsMapCanvas`."""
 
-    mapCanvasRefreshed = QtCore.pyqtSignal()
+    mapCanvasRefreshed, destinationCrsChanged = QtCore.pyqtSignal(), QtCore.pyqtSignal()
 
     def __init__(self, parent: Any) -> None:
         super().__init__(QtWidgets.QGraphicsScene(), parent)
@@ -39,6 +39,9 @@ class Canvas(QtWidgets.QGraphicsView):
 
     def extent(self) -> Rectangle:
         return Rectangle()
+
+    def getCoordinateTransform(self) -> Any:
+        return MagicMock(toMapCoordinates=lambda x, y: Place(500_000 + x, 5_000_000 - y))
 
 
 class CanvasItem(QtWidgets.QGraphicsItem):

@@ -23,6 +23,7 @@ from .library import errors, kinds, plugin_metadata, progress
 from .pages import help_url
 from .preselection import NOTHING, preselect
 from .results import forget_layers, load_on_completion, show_report
+from .start_files import file_name
 from .styling import LoadedLayers, icon_of
 from .tool_loading import LazyTool
 from .translation import tr
@@ -38,6 +39,7 @@ class ToolAlgorithm(NamedAlgorithm):
         super().__init__(tool)
         self._inputs: dict[str, Any] = {}
         self._alike: dict[str, Any] = {}
+        self._made_from: dict[str, str] = {}
         self._about = ""
 
     def createInstance(self) -> QgsProcessingAlgorithm:
@@ -110,6 +112,7 @@ class ToolAlgorithm(NamedAlgorithm):
             layer = self.parameterAsRasterLayer(parameters, qgis_name(like), context)
             if like and layer is not None:
                 self._alike[parameter.name] = layer.renderer().clone()
+                self._made_from[parameter.name] = file_name(layer)
                 self._about = layer.name()
         return True
 
@@ -136,8 +139,10 @@ class ToolAlgorithm(NamedAlgorithm):
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
         # A batch in which rows failed ran to its end, but not to a good one.
         bad = getattr(result, "exit_code", 0) != 0
+        # The dock tells results from steps.
+        told = getattr(feedback, "pushResult", feedback.pushInfo)
         for line in result.lines():
-            feedback.reportError(line) if bad else feedback.pushInfo(line)
+            feedback.reportError(line) if bad else told(line)
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 
@@ -172,7 +177,8 @@ class ToolAlgorithm(NamedAlgorithm):
         for parameter in self._tool.parameters:
             path, kind = values[parameter.name], parameter.kind
             if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
-                layers.add(str(path), context, self._alike.get(parameter.name))
+                alike, source = (d.get(parameter.name) for d in (self._alike, self._made_from))
+                layers.add(str(path), context, alike, source)
             for name in getattr(kind, "shows", ()) if path is not None else ():
                 load_on_completion(path / name, context)
                 layers.add(str(path / name), context)

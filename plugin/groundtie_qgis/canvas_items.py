@@ -36,6 +36,11 @@ def clearly(layer: Any) -> Any:
     return copy
 
 
+def top_left(canvas: QgsMapCanvas) -> QgsPointXY:
+    """Return the place in the map's top left corner: not that of its extent where it is rotated."""
+    return canvas.getCoordinateTransform().toMapCoordinates(0, 0)
+
+
 class Overlay(QgsMapCanvasItem):
     """Draws layers over the map, left of a line: a swipe; or all over it.
 
@@ -52,7 +57,7 @@ class Overlay(QgsMapCanvasItem):
         self._canvas = canvas
         self._layers: list[Any] = []
         self._image = QImage()
-        self._extent = QgsRectangle()
+        self._extent, self._corner = QgsRectangle(), QgsPointXY()
         self._job: QgsMapRendererParallelJob | None = None
         self.share = 1.0
         self.setZValue(height)
@@ -92,9 +97,14 @@ class Overlay(QgsMapCanvasItem):
         if self._job is None or not self._layers:
             return
         self._image = self._job.renderedImage()
-        self._extent = self._canvas.extent()
-        self.setRect(self._canvas.extent())
+        self._extent, self._corner = self._canvas.extent(), top_left(self._canvas)
+        self.updatePosition()
         self.update()
+
+    def updatePosition(self) -> None:
+        """Lie where the image was drawn (called by QGIS when the map moves)."""
+        self.setRect(self._extent)
+        self.setPos(self.toCanvasCoordinates(self._corner))
 
     def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
         if self._image.isNull() or not self._layers:
@@ -131,6 +141,7 @@ class PointsItem(QgsMapCanvasItem):
     def updatePosition(self) -> None:
         """Cover the map (called by QGIS when that moves)."""
         self.setRect(self._canvas.extent())
+        self.setPos(self.toCanvasCoordinates(top_left(self._canvas)))
         self.update()
 
     def on_screen(self) -> NDArray[np.float64]:

@@ -47,7 +47,6 @@ class GroundTieDock(QDockWidget):
         self.setAllowedAreas(
             Qt.DockWidgetArea.LeftDockWidgetArea | Qt.DockWidgetArea.RightDockWidgetArea
         )
-        self._canvas = canvas
         QgsProject.instance().layersWillBeRemoved.connect(self._forget)
 
     def _turn_to(self, _: int) -> None:
@@ -60,19 +59,22 @@ class GroundTieDock(QDockWidget):
             self.repair.stop()
 
     def _registered(self, outcome: Outcome, reference: Any, input: Any) -> None:
-        """Go on with what came of a registration."""
+        """Go on with what came of a registration; one that was cancelled changes nothing."""
+        if not (outcome.succeeded or outcome.files.get("REPORT")):
+            return
         registered = layer_of(outcome.files.get("OUTPUT"))
         self.look.show_pair(reference, registered)
-        if outcome.succeeded or outcome.files.get("REPORT"):
-            try:
-                points = outcome.files.get("TIE_POINTS")
-                if self.start.sensor is None:
-                    self.repair.open(reference, input, points)
-                elif points is not None:
-                    self.repair.open_sensor(reference, registered, self.start.sensor, outcome)
-            except errors.GroundTieError as error:
-                self.repair.close_points()
-                self.repair.text.setText(error.one_line())
+        try:
+            points = outcome.files.get("TIE_POINTS")
+            if points is None and self.repair.has_points_of(reference, input):
+                pass  # A refusal brings none: those that a person has edited stay.
+            elif self.start.sensor is None:
+                self.repair.open(reference, input, points)
+            elif points is not None:
+                self.repair.open_sensor(reference, registered, self.start.sensor, outcome)
+        except errors.GroundTieError as error:
+            self.repair.close_points()
+            self.repair.text.setText(error.one_line())
 
     def _written(self, reference: Any, layer: Any) -> None:
         self.look.show_pair(reference, layer)
@@ -101,6 +103,7 @@ class GroundTieDock(QDockWidget):
     def take_away(self) -> None:
         """Remove what was drawn on the map, and the connections (for unloading)."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
+        self.start.take_away()
         self.look.take_away()
+        self.repair.take_away()
         self.overlay.take_away()
-        self._canvas.scene().removeItem(self.repair.points)

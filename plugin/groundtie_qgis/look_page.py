@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.core import QgsPointXY, QgsRectangle
+from qgis.PyQt import sip
 from qgis.PyQt.QtCore import Qt, QTimer
 from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import (
@@ -66,8 +67,8 @@ class LookPage(QWidget):
         )
         self.next.clicked.connect(lambda: self.go(1))
         self.previous.clicked.connect(lambda: self.go(-1))
-        for key, step in (("N", 1), ("B", -1)):
-            shortcut = QShortcut(QKeySequence(key), self._canvas)
+        self._shortcuts = [QShortcut(QKeySequence(key), self._canvas) for key in ("N", "B")]
+        for shortcut, step in zip(self._shortcuts, (1, -1), strict=True):
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(lambda step=step: self.go(step))
         self.corners = [QPushButton(tr(name)) for name in _CORNERS]
@@ -122,6 +123,8 @@ class LookPage(QWidget):
         """Take what this draws from the map for good."""
         self.stop()
         self._beneath.take_away()
+        for shortcut in self._shortcuts:  # Of two with one key, none is heard.
+            sip.delete(shortcut)
 
     def _show_both(self, on: bool, share: float) -> None:
         """Draw the registered image, and over its left `share` the reference; or neither."""

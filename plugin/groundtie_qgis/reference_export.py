@@ -12,11 +12,13 @@ from qgis.core import (
     QgsProject,
     QgsRasterLayer,
 )
-from qgis.PyQt.QtCore import QSize
-from qgis.PyQt.QtGui import QImage
+from qgis.PyQt.QtCore import QSize, Qt
+from qgis.PyQt.QtGui import QColor, QImage
 
 from .dependencies import rasterio_env
 from .run import new_file
+from .start_files import file_name
+from .styling import MADE_FROM
 from .translation import mark
 
 MAP = mark("The map as it is drawn")
@@ -32,18 +34,23 @@ def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, 
     Parameters
     ----------
     reference
-        A raster layer; None: the map as it is drawn, without the input.
+        A raster layer; None: the map as it is drawn, without the input and what was made from it.
     input
         The raster layer to be registered.
     canvas
         The map.
     """
     if reference is None:
-        layers = [layer for layer in canvas.layers() if layer != input]
+        layers = [layer for layer in canvas.layers() if not _shows(layer, input)]
         reference = drawn(layers, input, "map")
     elif reference.providerType() != "gdal":
         reference = drawn([reference], input, reference.name())
     return reference, {"REFERENCE": named(reference), "INPUT": named(input)}
+
+
+def _shows(layer: Any, raster: Any) -> bool:
+    """Return whether a layer shows a raster: it would be registered to itself."""
+    return file_name(raster) in (file_name(layer), layer.customProperty(MADE_FROM))
 
 
 def named(layer: Any) -> str:
@@ -64,6 +71,7 @@ def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
     settings.setLayers(layers)
     settings.setDestinationCrs(input.crs())
     settings.setTransformContext(QgsProject.instance().transformContext())
+    settings.setBackgroundColor(QColor(Qt.GlobalColor.transparent))
     settings.setOutputDpi(96)
     settings.setOutputSize(size)
     settings.setExtent(extent)
@@ -84,7 +92,7 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
     bits = image.constBits()
     bits.setsize(image.bytesPerLine() * height)
     pixels = np.frombuffer(bits, np.uint8).reshape(height, -1)[:, : 4 * width]
-    bands = pixels.reshape(height, width, 4).transpose(2, 0, 1)[:3]
+    *bands, opacity = pixels.reshape(height, width, 4).transpose(2, 0, 1)
     edges = extent.xMinimum(), extent.yMinimum(), extent.xMaximum(), extent.yMaximum()
     profile = {
         "driver": "GTiff",
@@ -96,7 +104,8 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
         "transform": from_bounds(*edges, width, height),
     }
     with rasterio_env(), rasterio.open(path, "w", **profile) as raster:
-        raster.write(bands)
+        raster.write(np.stack(bands))
+        raster.write_mask(opacity > 0)  # Where no layer draws there is no ground.
 
 
 def between(source: Any, target: Any) -> QgsCoordinateTransform:

@@ -27,6 +27,7 @@ from .point_table import PointTable, PointView
 from .reference_export import any_of, between, layer_of
 from .run import Outcome
 from .sensor_run import SensorImage
+from .start_files import file_name
 from .translation import tr
 from .writer import Writer
 
@@ -60,7 +61,7 @@ class RepairPage(QWidget):
         self.fits: dict[str, Any] = {}
         self._reference: Any = None
         self._input: Any = None
-        self._clicked: QgsPointXY | None = None
+        self._clicked: tuple[float, float] | None = None
         self.writer = Writer(self._end_writing)
         # What an image with RPCs is, which then is written in place of the input.
         self._sensor: SensorImage | None = None
@@ -68,6 +69,7 @@ class RepairPage(QWidget):
         self._drag = DragTool(canvas, self.points, self._moved_on_map, self._choose)
         self._click = ClickTool(canvas, self._clicked_on_map)
         self._build()
+        canvas.destinationCrsChanged.connect(self._show_fit)
 
     def _build(self) -> None:
         self.text = QLabel(tr("Register two images first."))
@@ -100,7 +102,7 @@ class RepairPage(QWidget):
     def _enable(self) -> None:
         for widget in (self.drag, self.add, self.match, self.model):
             widget.setEnabled(self.review is not None)
-        self.write.setEnabled(bool(self.fits))
+        self.write.setEnabled(bool(self.fits) and self.writer.run is None)
 
     def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
         """Take the ground control of an image with RPCs, which `ortho` shows on the map."""
@@ -108,10 +110,10 @@ class RepairPage(QWidget):
         files, dem = outcome.files, image.dem
         with rasterio_env():
             opened = review.of_sensor_image(
-                reference.source(),
-                image.layer.source(),
+                file_name(reference),
+                file_name(image.layer),
                 files["RPC"],
-                None if dem is None else Path(dem.source()),
+                None if dem is None else Path(file_name(dem)),
                 None if dem is None else image.datum,
                 files["TIE_POINTS"],
             )
@@ -124,9 +126,9 @@ class RepairPage(QWidget):
         self._reference, self._input, self._sensor = reference, input, None
         with rasterio_env():
             if path is not None:
-                opened = review.Review.open(path, input.source())
+                opened = review.Review.open(path, file_name(input))
             else:
-                opened = review.without_points(reference.source(), input.source())
+                opened = review.without_points(file_name(reference), file_name(input))
         self.change(opened, "affine")
         self.text.setText(self._summary() if path is not None else tr(FIRST_POINTS))
 
@@ -146,6 +148,19 @@ class RepairPage(QWidget):
         """Return whether the points belong to one of the layers with these ids."""
         image = () if self._sensor is None else (self._sensor.layer, self._sensor.dem)
         return any_of(ids, self._reference, self._input, *image)
+
+    def take_away(self) -> None:
+        """Take what this draws from the map for good."""
+        self.stop()
+        if self.writer.run is not None:
+            self.writer.run.cancel()
+        self._canvas.destinationCrsChanged.disconnect(self._show_fit)
+        self._canvas.scene().removeItem(self.points)
+
+    def has_points_of(self, reference: Any, input: Any) -> bool:
+        """Return whether there are points between two layers."""
+        mine = self._reference is reference and self._input is input
+        return mine and self.review is not None and len(self.review.points) > 0
 
     def stop(self) -> None:
         """Leave the map to others."""
@@ -232,7 +247,7 @@ class RepairPage(QWidget):
 
     def _clicked_on_map(self, place: QgsPointXY) -> None:
         if self._clicked is None:
-            self._clicked = place
+            self._clicked = self._on_reference(place)
             self._overlay.show_layers([clearly(self._input)])
             self.text.setText(
                 tr("Shown is the input where its own georeferencing has it: click there.")
@@ -240,7 +255,7 @@ class RepairPage(QWidget):
             return
         first, self._clicked = self._clicked, None
         self._overlay.show_layers([clearly(self._reference)])
-        self.add_point(self._on_reference(first), self.review.input_px(self._on_reference(place)))
+        self.add_point(first, self.review.input_px(self._on_reference(place)))
 
     def add_point(self, reference_xy: Any, input_px: Any) -> None:
         """Add a point, where similarity refines it if that is asked for."""
@@ -250,7 +265,7 @@ class RepairPage(QWidget):
             fit = self.fits.get(self.kind())
             transform = self.review.nominal if fit is None else fit.transform
             seen = self._input if self._sensor is None else self._sensor.layer
-            images = self._reference.source(), seen.source()
+            images = file_name(self._reference), file_name(seen)
             try:
                 with rasterio_env():
                     input_px, peak = review.refine_click(*images, reference_xy, input_px, transform)
@@ -268,12 +283,12 @@ class RepairPage(QWidget):
         if refusal := self.writer.start(self.review, fit, *layers, self._sensor):
             self.text.setText(tr("Not written: {}.").format(refusal))
             return
-        self.write.setEnabled(False)
+        self._enable()
 
     def _end_writing(self, outcome: Outcome) -> None:
+        self._enable()
         if self.review is None:
             return  # One of the layers was taken out of the project meanwhile.
-        self.write.setEnabled(True)
         if not outcome.succeeded:
             self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))
             return
@@ -286,9 +301,16 @@ class RepairPage(QWidget):
 
     def _on_map(self, places: Any) -> list[QgsPointXY]:
         transform = between(self._crs(), self._canvas.mapSettings().destinationCrs())
-        return [transform.transform(QgsPointXY(x, y)) for x, y in places.tolist()]
+        drawn = (places + 0.5) * [1, -1] if self._is_on_pixels() else places
+        return [transform.transform(QgsPointXY(x, y)) for x, y in drawn.tolist()]
 
     def _on_reference(self, place: QgsPointXY) -> tuple[float, float]:
         transform = between(self._canvas.mapSettings().destinationCrs(), self._crs())
         found = transform.transform(place)
-        return found.x(), found.y()
+        x, y = found.x(), found.y()
+        return (x - 0.5, -y - 0.5) if self._is_on_pixels() else (x, y)
+
+    def _is_on_pixels(self) -> bool:
+        """Whether positions are pixels: QGIS draws them downwards from 0, centres at halves."""
+        review = self.review
+        return review.points.crs is None and not review.input_grid.is_georeferenced

@@ -31,7 +31,7 @@ class Outcome:
     reason
         Why not, in one line.
     lines
-        What the tool stated, a line each.
+        What the tool stated of its result, a line each.
     files
         What was written, by parameter.
     """
@@ -43,18 +43,16 @@ class Outcome:
 
 
 class Listener(QgsProcessingFeedback):
-    """Keeps what a run states."""
+    """Keeps what a run states of its result, and its errors."""
 
     def __init__(self) -> None:
         super().__init__(False)
         self.lines: list[str] = []
         self.errors: list[str] = []
 
-    def pushInfo(self, info: str) -> None:
-        self.lines.append(info)
-
-    def pushWarning(self, warning: str) -> None:
-        self.lines.append(warning)
+    def pushResult(self, line: str) -> None:
+        """Take a line of the result (called by the algorithms of tools)."""
+        self.lines.append(line)
 
     def reportError(self, error: str, fatalError: bool = False) -> None:
         self.errors.append(error)
@@ -114,6 +112,8 @@ class Run:
             self._algorithm, self._values, self._context, self._feedback
         )
         self._task.executed.connect(self._end)
+        # The task uses context and feedback, which it does not keep: without them QGIS crashes.
+        self._task.setProperty("run", self)
         QgsApplication.taskManager().addTask(self._task)
 
     def cancel(self) -> None:

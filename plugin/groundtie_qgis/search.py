@@ -8,7 +8,7 @@ from qgis.PyQt import sip
 
 from .dependencies import rasterio_env
 from .library import errors, library_module
-from .start_files import has_rpcs
+from .start_files import file_name, has_rpcs
 
 
 def usual_radius_m(tool: str, reference: Any, input: Any) -> float:
@@ -38,7 +38,7 @@ def usual_radius_m(tool: str, reference: Any, input: Any) -> float:
 def _grid(layer: Any) -> Any:
     """Return the grid of a layer's file, of one with RPCs that by which QGIS draws it."""
     if not has_rpcs(layer):
-        with library_module("rasters.reading").open_raster(layer.source()) as raster:
+        with library_module("rasters.reading").open_raster(file_name(layer)) as raster:
             return raster.grid
     from affine import Affine
     from rasterio.crs import CRS

@@ -63,14 +63,15 @@ class SensorRun:
         done: Callable[[Outcome], None],
         progress: Callable[[float], None],
     ) -> None:
-        self._image, self._reference = image, reference
+        # Layers may be taken out of the project meanwhile.
+        self._values, self._reference = image.values(), reference
         self._done, self._progress = done, progress
         files = {
             "OUTPUT": new_file("refined_RPC.TXT"),
             "RESIDUALS": new_file(points_name()),
             "REPORT": new_file("refined.html"),
         }
-        values = {**image.values(), **control}
+        values = {**self._values, **control}
         self._run = Run("refine_rpc", values, files, (), self._refined, self._first)
         self._lines: tuple[str, ...] = ()
 
@@ -97,7 +98,7 @@ class SensorRun:
             "TIE_POINTS": files["RESIDUALS"],
             "REPORT": files["REPORT"],
         }
-        values = {**self._image.values(), "REFERENCE": self._reference, "RPC": str(files["OUTPUT"])}
+        values = {**self._values, "REFERENCE": self._reference, "RPC": str(files["OUTPUT"])}
         ortho = {"OUTPUT": new_file("orthoimage.tif")}
         self._run = Run(
             *("orthorectify", values, ortho, ("OUTPUT",), self._projected),

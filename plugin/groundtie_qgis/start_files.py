@@ -1,7 +1,8 @@
-"""Names of the dock's files, and which images have RPCs."""
+"""Names of layers' and of the dock's files, and which images have RPCs."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,21 @@ def points_name() -> str:
     return "tie_points.geojson" if missing_for("", [Path(name)]) else name
 
 
+def file_name(layer: Any) -> str:
+    """Return a raster layer's source without the options that QGIS hangs onto it."""
+    return re.sub(r"\|(option|credential):[^|]*| authcfg='[^']+'", "", layer.source())
+
+
 def has_rpcs(layer: Any) -> bool:
     """Whether a raster layer is located by RPCs alone; QGIS draws it as GDAL warps it by them."""
     from osgeo import gdal
 
     if layer is None or layer.providerType() != "gdal":
         return False
-    dataset = gdal.Open(layer.source())
+    try:
+        dataset = gdal.Open(file_name(layer))
+    except RuntimeError:  # Another plugin may have GDAL raise where a file is gone.
+        return False
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
         return False
     return bool(dataset.GetMetadata("RPC"))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from qgis.core import QgsProviderRegistry
 from qgis.gui import QgsMapLayerComboBox
 from qgis.PyQt import sip
 from qgis.PyQt.QtCore import QTimer, QUrl
@@ -63,12 +64,15 @@ class StartPage(QWidget):
         self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
+        # In a project without layers the map stands in the box without being chosen.
+        self._chose_map = False
         self._build()
         self.propose()
 
     def _build(self) -> None:
-        self.reference, self.input = _raster_box(), _raster_box()
+        self.reference, self.input = _raster_box(), _raster_box(files=True)
         self.reference.setAdditionalItems([tr(MAP)])
+        self.reference.activated.connect(self._note_choice)
         self.pair = QComboBox()
         for tool, text in PAIRS.items():
             self.pair.addItem(tr(text), tool)
@@ -78,7 +82,7 @@ class StartPage(QWidget):
         self.radius.setSuffix(" m")
         self.radius.setSpecialValueText(tr("usual"))
         self.rotated = QCheckBox(tr("rotation unknown"))
-        self.dem = _raster_box()
+        self.dem = _raster_box(files=True)
         self.dem.setAllowEmptyLayer(True)
         self.dem.setLayer(None)
         self.datum = QComboBox()
@@ -131,12 +135,17 @@ class StartPage(QWidget):
 
     def propose(self) -> None:
         """Fill boxes that hold the same, or nothing, with two rasters of the project."""
+        if self._chose_map and self._from_map():
+            return
         if self.reference.currentLayer() not in (None, self.input.currentLayer()):
             return
         reference, input = proposed_pair(raster_files())
         if reference is not None and input is not None:
             self.reference.setLayer(reference)
             self.input.setLayer(input)
+
+    def _note_choice(self, _: int) -> None:
+        self._chose_map = self._from_map()
 
     def _note_change(self, box: Any) -> None:
         self._changed = box
@@ -189,6 +198,11 @@ class StartPage(QWidget):
         self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
         self._run.start()
 
+    def take_away(self) -> None:
+        """Stop what runs (for unloading)."""
+        if self._run is not None:
+            self._run.cancel()
+
     def _begin(self) -> None:
         self.sensor = None
         self.register.setText(tr("Cancel"))
@@ -225,7 +239,9 @@ class StartPage(QWidget):
 
     def _end(self, outcome: Outcome) -> None:
         self._run, self.outcome = None, outcome
-        if any(layer is not None and sip.isdeleted(layer) for layer in self._layers):
+        heights = () if self.sensor is None else (self.sensor.dem,)
+        layers = (*self._layers, *heights)
+        if any(layer is not None and sip.isdeleted(layer) for layer in layers):
             self._layers = ()  # Taken out of the project meanwhile.
         self.register.setText(tr("Register"))
         self.progress.hide()
@@ -234,7 +250,7 @@ class StartPage(QWidget):
         refused = not outcome.succeeded and report is not None
         self.tries.offer(self._worth_a_try() if refused else ())
         if outcome.succeeded:
-            self._state(True, "\n".join(first_lines(outcome.lines)))
+            self._state(True, first_lines(outcome.lines))
         else:
             self._state(False, outcome.reason)
         if self._layers:
@@ -287,7 +303,10 @@ class StartPage(QWidget):
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
-def _raster_box() -> QgsMapLayerComboBox:
+def _raster_box(files: bool = False) -> QgsMapLayerComboBox:
     box = QgsMapLayerComboBox()
     box.setFilters(RASTER_LAYERS)
+    if files:
+        providers = QgsProviderRegistry.instance().providerList()
+        box.setExcludedProviders([name for name in providers if name != "gdal"])
     return box

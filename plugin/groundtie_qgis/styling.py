@@ -21,6 +21,8 @@ from .compat import LINE
 from .library import FOLDER
 
 ICON = FOLDER / "icons" / "groundtie.svg"
+# What a layer that was made here keeps, also in a project's file: the file of its raster.
+MADE_FROM = "groundtie/made_from"
 TIE_POINTS = FOLDER / "styles" / "tie_points.qml"
 
 
@@ -49,14 +51,16 @@ class LoadedLayers:
         path: str,
         context: QgsProcessingContext,
         renderer: QgsRasterRenderer | None = None,
+        made_from: str | None = None,
     ) -> None:
         """Have the layer of the file `path` finished, if the run's context loads it.
 
-        Lines are drawn as tie points, rasters by the renderer of another raster.
+        Lines are drawn as tie points, rasters by the renderer of another raster, whose file the
+        layer keeps.
         """
         if context.willLoadLayerOnCompletion(path):
             details = context.layerToLoadOnCompletionDetails(path)
-            processor = LayerFinisher(self, details.project, renderer)
+            processor = LayerFinisher(self, details.project, renderer, made_from)
             self._count += 1
             _keep(processor)
             details.setPostProcessor(processor)
@@ -83,11 +87,13 @@ class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
         layers: LoadedLayers,
         project: QgsProject,
         renderer: QgsRasterRenderer | None = None,
+        made_from: str | None = None,
     ) -> None:
         super().__init__()
         self._layers = layers
         self._project = project
         self._renderer = renderer
+        self._made_from = made_from
 
     def postProcessLayer(
         self, layer: Any, context: QgsProcessingContext, feedback: QgsProcessingFeedback
@@ -99,6 +105,8 @@ class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
             _draw_as_tie_points(layer, feedback)
         if self._renderer is not None and isinstance(layer, QgsRasterLayer):
             draw_alike(layer, self._renderer)
+        if self._made_from is not None:
+            layer.setCustomProperty(MADE_FROM, self._made_from)
         self._layers.place(layer, self._project)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.gui import QgsRasterBandComboBox
+from qgis.PyQt import sip
 from qgis.PyQt.QtWidgets import QFormLayout, QGridLayout, QPushButton, QSizePolicy, QWidget
 
 from .translation import mark, tr
@@ -71,8 +72,9 @@ class BandRows(QWidget):
 
 
 def is_file(layer: Any) -> bool:
-    """Return whether a layer is a raster file, whose bands can be chosen."""
-    return layer is not None and layer.providerType() == "gdal"
+    """Return whether a layer of the project is a raster file, whose bands can be chosen."""
+    gone = layer is None or sip.isdeleted(layer)
+    return not gone and layer.providerType() == "gdal"
 
 
 def have_bands(layers: tuple[Any, ...]) -> bool:

@@ -12,13 +12,13 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingUtils,
-    QgsProviderRegistry,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
 
 from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
+from .start_files import file_name
 from .translation import tr
 
 
@@ -177,10 +177,4 @@ def _file_of(layer: Any, kind: Any) -> str:
             f"{tr(kind.label)} must be a raster file, not the layer {layer.name()} of the "
             f"provider {provider}; export it to a file first"
         )
-    return _without_options(layer.source())
-
-
-def _without_options(source: str) -> str:
-    """Return a layer's source without what QGIS hangs onto it behind bars."""
-    parts = QgsProviderRegistry.instance().decodeUri("gdal", source)
-    return str(source) if parts.get("layerName") else str(parts.get("path") or source)
+    return file_name(layer)

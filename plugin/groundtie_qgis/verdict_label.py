@@ -8,12 +8,13 @@ from typing import Any
 from qgis.PyQt.QtCore import Qt
 from qgis.PyQt.QtWidgets import QLabel
 
+from .start_files import file_name
 from .translation import tr
 from .wording import in_words
 
 _GREEN, _RED = "#1a7f37", "#b3261e"
-# What the lines that come after a tool's steps begin with.
-_RESULTS = ("the input", "correction", "accepted")
+# How many lines of a result are shown: its report has the others.
+_MOST_LINES = 6
 
 
 class VerdictLabel(QLabel):
@@ -28,7 +29,7 @@ class VerdictLabel(QLabel):
         """Show a verdict; files of `layers` are named as these are."""
         heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in layers:
-            text = text.replace(layer.source(), layer.name())
+            text = text.replace(file_name(layer), layer.name())
         lines = html.escape(in_words(text, None)).split("\n")
         self.setText(
             f'<p style="color: {_GREEN if good else _RED}"><b>{heading}</b></p>'
@@ -36,7 +37,6 @@ class VerdictLabel(QLabel):
         )
 
 
-def first_lines(lines: tuple[str, ...], most: int = 6) -> list[str]:
-    """Return what a tool stated of its result: what comes after its steps."""
-    starts = [i for i, line in enumerate(lines) if line.startswith(_RESULTS)]
-    return list(lines[starts[0] if starts else -most :][:most])
+def first_lines(lines: tuple[str, ...]) -> str:
+    """Return the first of what a tool stated of its result."""
+    return "\n".join(lines[:_MOST_LINES])

@@ -6,6 +6,7 @@ Pictures of every step are left in the folder that GROUNDTIE_PICTURES names.
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,7 @@ def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -
     assert outcome.succeeded, outcome.reason
     assert "Accepted" in dock.start.verdict.text()
     assert "<p>correction: 5.0 px (5.0 m)" in dock.start.verdict.text()
+    assert outcome.lines[0].startswith("correction: ")  # Steps are no results.
     assert dock.start.report.isVisible()
     assert not dock.start.tries.wider.isVisible()
     desktop.picture("2_verdict")
@@ -63,6 +65,37 @@ def test_from_two_layers_to_a_reviewed_image(desktop: Desktop, tmp_path: Path) -
     desktop.picture("3_swipe")
     dock.look.swipe.click()
     assert not dock.overlay.isVisible()
+
+
+@pytest.mark.parametrize("way", ["options", "archive"])
+def test_layers_of_archives_and_with_options(desktop: Desktop, tmp_path: Path, way: str) -> None:
+    from groundtie_qgis import search
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    write_pair(tmp_path, 0)
+    archive = tmp_path / "a pair ö.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        for name in ("reference", "input"):
+            file.write(tmp_path / f"{name}.tif", f"b/{name}.tif")
+    place = {"options": f"{tmp_path}/{{}}.tif|option:NUM_THREADS=2"}.get(
+        way, f"/vsizip/{archive}/b/{{}}.tif"
+    )
+    layers = [QgsRasterLayer(place.format(name), name) for name in ("reference", "input")]
+    for layer in layers:
+        QgsProject.instance().addMapLayer(layer)
+    desktop.canvas.setExtent(layers[0].extent())
+    dock = desktop.open()
+    assert search.usual_radius_m("register", *layers) == 100
+    dock.start.pair.setCurrentIndex(dock.start.pair.findData("coregister"))
+    dock.start.radius.setValue(12)
+    outcome = desktop.register()
+    assert outcome.succeeded, outcome.reason
+    repair = dock.repair
+    assert len(repair.review.points) > 0, repair.text.text()
+    count = len(repair.review.points)
+    repair.add_point(repair.review.points.reference_xy[0], repair.review.points.input_px[0])
+    assert len(repair.review.points) == count + 1
+    assert repair.review.points.score[-1] > 5
 
 
 def test_looking_goes_from_place_to_place(
@@ -239,10 +272,14 @@ def test_wrong_values_are_told_at_once(desktop: Desktop) -> None:
     assert "Choose two raster layers" in start.verdict.text()
 
 
+@pytest.mark.parametrize("rotation_deg", [0, 30])
 def test_swipe_shows_the_registered_image_whatever_lies_above_it(
-    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path], rotation_deg: float
 ) -> None:
     dock = open_registered(tmp_path, desktop, registered_files)
+    desktop.canvas.setRotation(rotation_deg)
+    corner = dock.repair.points.pos()
+    assert corner.manhattanLength() < 1e-6  # Points are painted in the map's pixels.
     dock.tabs.setCurrentWidget(dock.look)
     # The input lies above: its corner, where it is not registered to, is what the map shows.
     desktop.canvas.setLayers([dock.repair._input])
@@ -317,6 +354,157 @@ def test_layers_that_go_during_a_run_do_no_harm(desktop: Desktop, tmp_path: Path
     desktop.wait(lambda: start._run is None)
     assert "Not registered" in start.verdict.text()
     assert not desktop.dock.look.swipe.isEnabled()
+
+
+def test_the_dock_opens_beside_a_layer_whose_file_is_gone(desktop: Desktop, tmp_path: Path) -> None:
+    """Also where another plugin has GDAL raise errors."""
+    from osgeo import gdal
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    gone = QgsRasterLayer(str(tmp_path / "gone.tif"), "gone")
+    QgsProject.instance().addMapLayer(gone)
+    raised = gdal.GetUseExceptions()
+    gdal.UseExceptions()
+    try:
+        assert desktop.dock is None
+        desktop.dock = desktop._dock(desktop.iface)
+    finally:
+        if not raised:
+            gdal.DontUseExceptions()
+    assert desktop.dock.start.heights.isHidden()
+
+
+@pytest.mark.parametrize("name", ["dem", "image"])
+def test_layers_that_go_while_rpcs_are_refined(
+    desktop: Desktop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    from groundtie_qgis import sensor_run
+    from groundtie_qgis.run import Outcome, Run
+    from qgis.core import QgsProject
+
+    refining: list[Any] = []
+
+    class Refining(Run):
+        def start(self) -> None:
+            if refining:  # What comes next is the orthoimage, of a layer that is gone.
+                super().start()
+            refining.append(self)
+
+    monkeypatch.setattr(sensor_run, "Run", Refining)
+    make_scene(tmp_path, None)
+    reference, image, dem = desktop.load(tmp_path, "reference", "image", "dem")
+    start = desktop.open().start
+    start.reference.setLayer(reference)
+    start.input.setLayer(image)
+    start.dem.setLayer(dem)
+    start.register.click()
+    (first,) = refining
+    first._files["REPORT"].write_text("refined", encoding="utf-8")
+    QgsProject.instance().removeMapLayer({"dem": dem, "image": image}[name].id())
+    first._done(Outcome(True, files=first._files))
+    assert start._run is None
+    assert start.register.text() == "Register"
+    assert "Not registered" in start.verdict.text()
+
+
+def test_layers_that_go_after_a_refusal_do_no_harm(
+    desktop: Desktop, tmp_path: Path, asked: list[tuple[str, dict[str, Any]]]
+) -> None:
+    from qgis.core import QgsProject
+
+    pair(tmp_path, desktop)
+    start = desktop.open().start
+    desktop.register()
+    QgsProject.instance().clear()
+    start.choose_bands()
+    assert start.bands.isVisible()
+
+
+def test_a_refusal_takes_no_edited_points_away(
+    desktop: Desktop,
+    tmp_path: Path,
+    registered_files: dict[str, Path],
+    asked: list[tuple[str, dict[str, Any]]],
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    repair, start = dock.repair, dock.start
+    repair.change(repair.review.switch([0], False))
+    start.reference.setLayer(repair._reference)
+    start.input.setLayer(repair._input)
+    desktop.wait(lambda: not start._apart.isActive())
+    desktop.register()
+    assert asked
+    assert not repair.review.points.used[0]
+    assert repair.write.isEnabled()
+
+
+def test_a_run_that_is_cancelled_changes_nothing(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    dock = open_registered(tmp_path, desktop, registered_files)
+    shown = dock.look._registered
+    dock.start.register.click()
+    dock.start.register.click()  # it is Cancel now
+    desktop.wait(lambda: dock.start._run is None)
+    assert "cancelled" in dock.start.verdict.text()
+    assert dock.look._registered is shown
+    assert dock.look.swipe.isEnabled()
+    assert len(dock.repair.review.points) > 0
+
+
+def test_what_is_no_file_is_no_input(desktop: Desktop, tmp_path: Path) -> None:
+    """A web map as the input would be drawn as a whole, the Earth, before it is refused."""
+    from qgis.core import QgsProject, QgsRasterLayer
+
+    pair(tmp_path, desktop)
+    source = "type=xyz&url=file:///nowhere/{z}/{x}/{y}.png&zmin=1&zmax=16"
+    QgsProject.instance().addMapLayer(QgsRasterLayer(source, "web", "wms"))
+    start = desktop.open().start
+    offered = {
+        name: [box.itemText(index) for index in range(box.count())]
+        for name, box in (
+            ("reference", start.reference),
+            ("input", start.input),
+            ("dem", start.dem),
+        )
+    }
+    assert {name for name, texts in offered.items() if "web" in texts} == {"reference"}
+
+
+def test_the_map_stays_chosen_when_the_dock_is_shown_again(
+    desktop: Desktop, tmp_path: Path
+) -> None:
+    dock = desktop.open()
+    box = dock.start.reference
+    chosen = box.currentText()
+    assert chosen == "The map as it is drawn"  # There is nothing else; nobody chose it.
+    pair(tmp_path, desktop)
+    dock.hide()
+    dock.show()
+    assert box.currentText() == "reference"
+    box.setCurrentIndex(box.findText(chosen))
+    box.activated.emit(box.currentIndex())
+    dock.hide()
+    dock.show()
+    assert box.currentText() == chosen
+
+
+def test_what_is_unloaded_leaves_nothing_behind(
+    desktop: Desktop, tmp_path: Path, registered_files: dict[str, Path]
+) -> None:
+    from qgis.PyQt.QtWidgets import QShortcut
+
+    dock = open_registered(tmp_path, desktop, registered_files)
+    dock.repair.drag.click()
+    dock.repair.write.click()
+    dock.start.register.click()
+    dock.take_away()
+    desktop.dock = None
+    assert desktop.canvas.mapTool() is None
+    assert desktop.canvas.findChildren(QShortcut) == []
+    desktop.wait(lambda: dock.start._run is dock.repair.writer.run is None)
+    assert "cancelled" in dock.start.outcome.reason
+    assert "cancelled" in dock.repair.writer.outcome.reason
 
 
 def write_exact_control(scene: Scene, path: Path) -> Path:

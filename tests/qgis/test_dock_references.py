@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import rasterio
 from desktops import Desktop, pair
-from noise_pairs import ORIGIN
+from noise_pairs import ORIGIN, write_raster
 
 
 def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
@@ -29,6 +30,45 @@ def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path:
         truth = np.array([values[0] for values in ground.sample(place)], float)
     # The stretch is linear: order and sign of differences stay.
     assert np.sign(np.diff(there)) == np.sign(np.diff(truth))
+
+
+def test_where_no_layer_draws_there_is_no_ground(desktop: Desktop, tmp_path: Path) -> None:
+    from groundtie_qgis.reference_export import with_files
+
+    _, input = pair(tmp_path, desktop)
+    with rasterio.open(tmp_path / "reference.tif") as whole:
+        west = whole.read(window=((0, whole.height), (0, 200))).astype(float)
+        write_raster(tmp_path / "west.tif", west, whole.transform)
+    desktop.canvas.setLayers(desktop.load(tmp_path, "west"))
+    made, _ = with_files(None, input, desktop.canvas)
+    with rasterio.open(made.source()) as drawn:
+        mask = drawn.dataset_mask() > 0
+        first, last = (drawn.index(ORIGIN[0] + x, ORIGIN[1] - y) for x, y in ((3, 3), (197, 380)))
+        assert mask[first[0] : last[0], first[1] : last[1]].all()
+        assert not mask[:, drawn.index(ORIGIN[0] + 203, ORIGIN[1])[1] :].any()
+
+
+def test_the_map_shows_nothing_of_the_input(
+    desktop: Desktop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither in another layer, nor registered: it would be registered to itself."""
+    from groundtie_qgis import reference_export
+    from qgis.core import QgsProject
+
+    reference, input = pair(tmp_path, desktop)
+    start = desktop.open().start
+    start.pair.setCurrentIndex(start.pair.findData("coregister"))
+    start.radius.setValue(12)
+    assert desktop.register().succeeded
+    desktop.load(tmp_path, "input")
+    assert len(QgsProject.instance().mapLayers()) == 4
+    desktop.refresh()
+    drawn: list[Any] = []
+    monkeypatch.setattr(
+        reference_export, "drawn", lambda layers, *_: [drawn.extend(layers), reference][1]
+    )
+    reference_export.with_files(None, input, desktop.canvas)
+    assert drawn == [reference]
 
 
 ZOOM, TILES = 16, 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 import rasterio
 from desktops import Desktop, drag, open_registered
-from noise_pairs import ORIGIN, SHIFT
+from noise_pairs import ORIGIN, SHIFT, write_raster
 
 
 @pytest.fixture
@@ -70,6 +71,28 @@ def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path:
     desktop.picture("6_written")
 
 
+def test_an_image_is_written_once_while_points_change(desktop: Desktop, dock: Any) -> None:
+    repair = dock.repair
+    repair.write.click()
+    repair.change(repair.review.switch([0], False))
+    assert repair.writer.run is not None
+    assert not repair.write.isEnabled()
+    desktop.wait(lambda: repair.writer.run is None)
+    assert repair.text.text().startswith("Written: "), repair.text.text()
+    assert repair.write.isEnabled()
+
+
+def test_a_run_that_nobody_keeps_comes_to_its_end(desktop: Desktop, dock: Any) -> None:
+    """Its task uses what it owns: QGIS would crash."""
+    done: list[Any] = []
+    dock.repair.writer._done = done.append
+    dock.repair.write.click()
+    dock.repair.writer.run = None
+    gc.collect()
+    desktop.wait(lambda: bool(done))
+    assert done[0].succeeded, done[0].reason
+
+
 def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(dock: Any) -> None:
     from qgis.PyQt.QtCore import Qt
 
@@ -124,6 +147,49 @@ def test_two_thousand_points_are_fitted_once_for_each_drag(
     assert repair.review.points.edited.sum() == 3
     assert len(fitted) == 3
     print(f"a drag of one of {count} points: {min(seconds):.3f} s of processor")
+
+
+def test_points_go_with_a_map_whose_crs_changes(desktop: Desktop, dock: Any) -> None:
+    from groundtie_qgis.reference_export import between
+    from qgis.core import QgsCoordinateReferenceSystem, QgsPointXY
+
+    repair = dock.repair
+    place = QgsPointXY(ORIGIN[0] + 200, ORIGIN[1] - 180)
+    repair.match.setChecked(False)
+    repair.add.click()
+    repair._clicked_on_map(place)
+    web = QgsCoordinateReferenceSystem("EPSG:3857")
+    to_web = between(desktop.canvas.mapSettings().destinationCrs(), web)
+    desktop.canvas.setDestinationCrs(web)
+    repair._clicked_on_map(to_web.transform(place))
+    xy = repair.review.points.reference_xy
+    np.testing.assert_allclose(xy[-1], [place.x(), place.y()], atol=1e-3)
+    worst = repair.review.worst(repair.fits[repair.kind()].residuals_px)[0]
+    for index, seen in ((0, repair.points.rows[0][1]), (worst, dock.look._worst[0])):
+        expected = to_web.transform(QgsPointXY(*xy[index]))
+        assert expected.distance(seen) < 1e-3
+
+
+def test_points_of_images_without_georeferencing(desktop: Desktop, tmp_path: Path) -> None:
+    """They lie on the images, which QGIS draws below y = 0, from the corner of the first pixel."""
+    from qgis.core import QgsPointXY
+
+    ground = np.random.Generator(np.random.PCG64(0)).uniform(1, 254, (1, 64, 64))
+    for name in ("reference", "input"):
+        write_raster(tmp_path / f"{name}.tif", ground, None)
+    images = desktop.load(tmp_path, "reference", "input")
+    repair = desktop.open().repair
+    repair.open(*images, None)
+    repair.match.setChecked(False)
+    repair.add.click()
+    for place in (QgsPointXY(20.5, -10.5), QgsPointXY(24.5, -13.5)):
+        assert images[0].extent().contains(place)
+        repair._clicked_on_map(place)
+    points = repair.review.points
+    np.testing.assert_allclose(points.reference_xy, [[20, 10]])
+    np.testing.assert_allclose(points.input_px, [[24, 13]])
+    nominal, place = repair.points.rows[0][:2]
+    assert (nominal, place) == (QgsPointXY(24.5, -13.5), QgsPointXY(20.5, -10.5))
 
 
 def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) -> None:
