@@ -140,9 +140,9 @@ class ToolAlgorithm(NamedAlgorithm):
         # A batch in which rows failed ran to its end, but not to a good one.
         bad = getattr(result, "exit_code", 0) != 0
         # The dock tells results from steps.
-        told = getattr(feedback, "pushResult", feedback.pushInfo)
+        push = getattr(feedback, "pushResult", feedback.pushInfo)
         for line in result.lines():
-            feedback.reportError(line) if bad else told(line)
+            feedback.reportError(line) if bad else push(line)
         self._finish_layers(values, context)
         return self._results(values, result.summary())
 

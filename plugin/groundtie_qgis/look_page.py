@@ -123,7 +123,7 @@ class LookPage(QWidget):
         """Take what this draws from the map for good."""
         self.stop()
         self._beneath.take_away()
-        for shortcut in self._shortcuts:  # Of two with one key, none is heard.
+        for shortcut in self._shortcuts:  # Of two with one key, Qt runs none.
             sip.delete(shortcut)
 
     def _show_both(self, on: bool, share: float) -> None:
