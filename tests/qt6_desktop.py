@@ -84,7 +84,9 @@ def install_stand_ins() -> None:
     core.QgsCoordinateTransform = lambda *_: MagicMock(transform=lambda place: place)
     core.QgsProcessingFeedback = object
     gui.QgsMapCanvas, gui.QgsMapCanvasItem = Canvas, CanvasItem
-    gui.QgsMapTool = type("QgsMapTool", (QtCore.QObject,), {"setCursor": MagicMock()})
+    gui.QgsMapTool = type(
+        "QgsMapTool", (QtCore.QObject,), {"setCursor": MagicMock(), "setButton": MagicMock()}
+    )
     gui.QgsMapLayerComboBox = gui.QgsRasterBandComboBox = LayerBox
     package = types.ModuleType("qgis")
     vars(package).update(core=core, gui=gui, utils=utils, PyQt=qt)

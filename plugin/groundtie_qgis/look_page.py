@@ -61,6 +61,7 @@ class LookPage(QWidget):
         for button in (self.swipe, self.flicker):
             button.setCheckable(True)
         self.swipe.toggled.connect(self._swipe)
+        self._tool.setButton(self.swipe)
         self.flicker.toggled.connect(self._flicker)
         self.next, self.previous = (
             QPushButton(tr(text)) for text in (mark("Next worst point (N)"), mark("Back (B)"))

@@ -85,6 +85,9 @@ class RepairPage(QWidget):
         self.add.setCheckable(True)
         self.drag.toggled.connect(self._set_dragging)
         self.add.toggled.connect(self._set_adding)
+        # Released where another tool of the map is chosen, of these or of QGIS.
+        self._drag.setButton(self.drag)
+        self._click.setButton(self.add)
         self.match = QCheckBox(tr("refine clicks by similarity"))
         self.match.setChecked(True)
         self.write = QPushButton(tr("Write image"))
@@ -221,7 +224,6 @@ class RepairPage(QWidget):
     def _set_dragging(self, on: bool) -> None:
         self._set_tool(self._drag, on)
         if on:
-            self.add.setChecked(False)
             self.text.setText(
                 tr("Pull a mark to its place on the reference, or a line's other end.")
             )
@@ -231,7 +233,6 @@ class RepairPage(QWidget):
         self._set_tool(self._click, on)
         self._overlay.show_layers([clearly(self._reference)] if on else [])
         if on:
-            self.drag.setChecked(False)
             self.text.setText(tr("Shown is the reference: click a place that both images have."))
 
     def _set_tool(self, tool: Any, on: bool) -> None:

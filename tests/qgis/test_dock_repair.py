@@ -192,6 +192,29 @@ def test_points_of_images_without_georeferencing(desktop: Desktop, tmp_path: Pat
     assert (nominal, place) == (QgsPointXY(24.5, -13.5), QgsPointXY(20.5, -10.5))
 
 
+def test_buttons_are_released_where_another_tool_of_the_map_is_chosen(
+    desktop: Desktop, dock: Any
+) -> None:
+    from qgis.gui import QgsMapToolPan
+
+    repair, look = dock.repair, dock.look
+    pan = QgsMapToolPan(desktop.canvas)
+    for button in (repair.drag, repair.add, look.swipe):
+        dock.tabs.setCurrentWidget(button.parent())
+        button.click()
+        assert button.isChecked()
+        assert desktop.canvas.mapTool() is not pan
+        desktop.canvas.setMapTool(pan)
+        assert not button.isChecked()
+        assert desktop.canvas.mapTool() is pan
+        assert not dock.overlay.isVisible()
+    # So are those that exclude each other.
+    dock.tabs.setCurrentWidget(repair)
+    repair.drag.click()
+    repair.add.click()
+    assert (repair.drag.isChecked(), repair.add.isChecked()) == (False, True)
+
+
 def test_a_point_is_added_by_a_click_in_each_image(desktop: Desktop, dock: Any) -> None:
     from qgis.core import QgsPointXY
 
