@@ -273,10 +273,9 @@ def make_pair(
     limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     outline = inp.grid.to_pixels_of(ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     if not len(finite(outline)):
-        maps = [crs_name(crs) for crs in (inp.grid.crs, ref.grid.crs) if crs is not None]
+        own, other = (crs_name(of.grid.crs) for of in (inp, ref) if of.grid.crs is not None)
         raise NoOverlapError(
-            f"{inp.path} lies nowhere on the map of {ref.path}: nothing leads there "
-            f"from {' to '.join(maps)}"
+            f"{inp.path} (in {own}) has no position in the CRS of {ref.path} ({other})"
         )
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if not limits.is_shift and not ref.grid.is_georeferenced:
