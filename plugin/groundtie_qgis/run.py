@@ -131,6 +131,7 @@ class Run:
             "" if succeeded else (errors[0] if errors else tr("cancelled; nothing was written"))
         )
         self._done(Outcome(succeeded, reason, tuple(self._feedback.lines), files))
+        self._task.setProperty("run", None)
 
 
 def new_file(name: str) -> Path:

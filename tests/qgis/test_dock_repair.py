@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -83,14 +84,18 @@ def test_an_image_is_written_once_while_points_change(desktop: Desktop, dock: An
 
 
 def test_a_run_that_nobody_keeps_comes_to_its_end(desktop: Desktop, dock: Any) -> None:
-    """Its task uses what it owns: QGIS would crash."""
+    """Its task uses what it owns: QGIS would crash. At its end it goes, with its layers."""
     done: list[Any] = []
     dock.repair.writer._done = done.append
     dock.repair.write.click()
+    run = weakref.ref(dock.repair.writer.run)
     dock.repair.writer.run = None
     gc.collect()
+    assert run() is not None
     desktop.wait(lambda: bool(done))
     assert done[0].succeeded, done[0].reason
+    gc.collect()
+    assert run() is None
 
 
 def test_the_table_is_sorted_by_its_headings_and_the_choice_goes_with_its_point(dock: Any) -> None:
