@@ -47,26 +47,26 @@ def _exchanged_roles(evidence: EvidenceOfPoints) -> str | None:
 AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "chance agreement",
-        f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or as many as agree would by "
-        f"chance with a probability above 10^{LARGEST_LOG10_CHANCE:.0f}",
+        f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or their agreement has a "
+        f"probability by chance above 10^{LARGEST_LOG10_CHANCE:.0f}",
         "[Moisan2004]; suites crossings, city and attacks",
         "give a larger part of the scene, or more points that take no part in the fit",
         _by_chance,
     ),
     Rule(
         "small share of check points",
-        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree, or of a pose that "
-        f"neither rotates nor scales less than {SMALLEST_SHARE_UNROTATED:.0%}",
+        f"less than {SMALLEST_INLIER_SHARE:.0%} of the held-out points agree; less than "
+        f"{SMALLEST_SHARE_UNROTATED:.0%} with a pose that neither rotates nor scales",
         "suites simulated, real and attacks",
         "mask clouds and changes; give bands, or points, that show the same",
         _few_agree,
     ),
     Rule(
         "exchanged roles",
-        "check points would agree as well by chance with a probability above "
-        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and those with "
-        "reference and input exchanged, around a coarse search of their own, agree as they may by "
-        "chance",
+        "the agreement of the check points has a probability by chance above "
+        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and check points "
+        "that are matched with reference and input exchanged, around a coarse search of their own, "
+        "agree no better than by chance",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,

@@ -25,8 +25,8 @@ def _bands_apart(evidence: ImagesEvidence) -> str | None:
 BANDS_RULES: tuple[Rule, ...] = (
     Rule(
         "bands apart",
-        "a band of the input, or of a reference all of whose bands are matched, shows the ground "
-        "farther from where the first of them does than the largest error",
+        "a band of the input shows the ground farther off than the largest error from where the "
+        "first band does; or a band of the reference does, if all of its bands are matched",
         "the user's largest error",
         "register the bands to one another first, or give an image of one band",
         _bands_apart,

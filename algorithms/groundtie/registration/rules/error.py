@@ -39,8 +39,8 @@ ERROR_RULES: tuple[Rule, ...] = (
     Rule(
         "uncertain transform",
         "the model varies by more than the largest error if blocks of points are left out in turn, "
-        "or its CE90, what heights may displace all points by included, is above that of errors "
-        "as large",
+        "or its CE90, which includes what heights may displace all points by, is above the CE90 "
+        "that belongs to the largest error",
         "jackknife, [Efron1993]; [Mauchly1940]; the user's largest error",
         "give a simpler model, or a larger part of the scene; in a town, give a mask of the ground",
         _uncertain,

@@ -21,8 +21,8 @@ def _ground_not_found(evidence: ImagesEvidence) -> str | None:
 IMAGES_RULES: tuple[Rule, ...] = (
     Rule(
         "ground not found",
-        "a radar image of a town has no speckle, or the reference no CRS, by which the ground is "
-        "found",
+        "a radar image of a town has no speckle, or the reference has no CRS; the ground of a town "
+        "cannot be found without them",
         "suites city and coarse_towns",
         f"give the radar image unfiltered, and the reference a CRS; {ON_GROUND}",
         _ground_not_found,

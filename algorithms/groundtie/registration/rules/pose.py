@@ -65,8 +65,8 @@ POSE_RULES: tuple[Rule, ...] = (
     Rule(
         "other pose",
         "an exhaustive search over all rotations, and shifts of up to a quarter of the input, "
-        f"finds another pose, whose corners are more than {SAME_SHARE:.0%} of the reference's "
-        "longer side away",
+        f"finds another pose, whose corners lie more than {SAME_SHARE:.0%} of the reference's "
+        "longer side off",
         "suite rotated_pairs",
         "allow larger rotations and shifts",
         _not_exhaustive,

@@ -42,14 +42,14 @@ REFINEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "narrow control",
         f"control points spread over less than {_SMALLEST_EXTENT:.0%} of a side of the image, "
-        "unless somebody gives them and asks for a shift",
+        "unless they are given by the user and only a shift is asked for",
         "suite rpc",
         "give control all over the image, or points of your own with --model shift",
         _narrow_control,
     ),
     Rule(
         "not nearer than before",
-        "held-out points are no nearer by the refined RPCs than by the delivered ones",
+        "the refined RPCs place the held-out points no nearer than the delivered ones",
         "definition of a refinement",
         "keep the delivered RPCs",
         _not_nearer,

@@ -66,8 +66,8 @@ def _town_matched_whole(evidence: RegistrationEvidence) -> str | None:
 SCENE_RULES: tuple[Rule, ...] = (
     Rule(
         "few points on the ground",
-        "where the ground that was found in a radar image is matched alone in an image with RPCs: "
-        f"fewer than {_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours",
+        f"fewer than {_FEWEST_IN_COLOURS} check points agree, {_FEWEST_GREY} without colours, "
+        "where an image with RPCs is matched on the ground alone that was found in a radar image",
         "suites rpc_city and attacks",
         ON_GROUND,
         _few_on_ground,
@@ -75,9 +75,10 @@ SCENE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "surface model elsewhere",
-        f"the reference or the registered input does not correlate by {CLEAR_CORRELATION:g} with "
-        "what the surface model and the view let expect, or the input does elsewhere by more than "
-        f"the largest error; by {RENDERED_CORRELATION:g} where the surface model is the reference",
+        "the reference or the registered input correlates by less than "
+        f"{CLEAR_CORRELATION:g} ({RENDERED_CORRELATION:g} where the surface model is the "
+        "reference) with the image expected from the surface model and the view, or the input "
+        "correlates best at a place farther off than the largest error",
         "suite towns",
         "give the surface model of this place and the right views, or leave it out",
         _surface_elsewhere,
@@ -85,8 +86,8 @@ SCENE_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "town matched whole",
-        f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar's of a "
-        f"town, less than {LEAST_AREA:.0%} of coarse pixels vary alike, and not the ground alone "
+        f"less than {_CLEAR_SHARE:.0%} of the check points agree, an image may be a radar image of "
+        f"a town, less than {LEAST_AREA:.0%} of coarse pixels vary alike, and more than the ground "
         "was matched",
         "suite city",
         f"if it is a town, give the radar image unfiltered; {ON_GROUND}",

@@ -20,7 +20,7 @@ def _ended_with(kind: type[GroundTieError]) -> Callable[[SearchEvidence], str | 
 SEARCH_RULES: tuple[Rule, ...] = (
     Rule(
         "second place",
-        "a second place matches about as well as the best: half of its evidence (log10)",
+        "a second place has more than half of the best place's evidence (log10)",
         "suite crossings and repetitive scenes",
         "give a larger part of the scene, or a matching pixel size that shows more than what "
         "repeats",
@@ -29,8 +29,8 @@ SEARCH_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing in common",
-        "no place matches better than random ones would, or keypoints agree on a second transform, "
-        "as those of ground and of elevated objects",
+        "no place matches better than random images would, or keypoints agree on a second "
+        "transform, as keypoints of the ground and of elevated objects do",
         "expected false alarms above 1; [Moisan2004]",
         f"{WIDER} (of images on maps: with coregister, match_sar_sar or match_optical)",
         _ended_with(NothingFoundError),

@@ -54,7 +54,7 @@ SERIES_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "loops do not close",
-        "ways around a date and two others miss their start by more than the covariances explain "
+        "loops over a date and two others miss their start by more than the covariances explain "
         "once in 1000 times, or its registrations contradict the network, and no second way "
         "confirms it",
         "[Baarda1968]; suite series",
@@ -63,8 +63,8 @@ SERIES_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "one way alone",
-        "a date that the reference, or the date with most links, refuses is reached by one way "
-        "that no other confirms",
+        "the registration of a date to the reference, or to the date with most links, is refused, "
+        "and the one way that reaches the date is confirmed by no other",
         "a loop is the only check on such a way",
         "give further dates near to it in time",
         _one_way,

@@ -197,9 +197,8 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
 SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
-        "three neighbouring chips or more match at one place elsewhere, all but the highest "
-        f"together {LEAST_EXCESS:g} standard deviations of noise better than where the transform "
-        "has each",
+        "three neighbouring chips or more match better at one other place than where the transform "
+        f"has them: all but the highest together by {LEAST_EXCESS:g} standard deviations of noise",
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
@@ -207,10 +206,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "second place nearby",
-        "chips all over, moved elsewhere together within "
-        f"{SURVEY_RADIUS_PX} px, have a second peak of {PEAK_DEVIATIONS:g} robust standard "
-        "deviations; or, without a mask of the ground, match at least "
-        f"{RIVAL_HEIGHT:g} times as well",
+        f"the mean surface of chips all over has, within {SURVEY_RADIUS_PX} px, a second peak of "
+        f"{PEAK_DEVIATIONS:g} robust standard deviations; or, without a mask of the ground, a "
+        f"place elsewhere that is at least {RIVAL_HEIGHT:g} times as high",
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_nearby,
@@ -218,9 +216,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "weak similarity",
-        f"of chips all over less than {_LEAST_CHIPS:g} overlap with the input where the transform "
-        "has them; or, without a mask of the ground, their mean similarity there is below "
-        f"{WEAK_HEIGHT:g} robust standard deviations of one of them",
+        f"less than {_LEAST_CHIPS:.0%} of chips all over overlap with the input where the "
+        "transform has them; or, without a mask of the ground, their mean similarity there is "
+        f"below {WEAK_HEIGHT:g} robust standard deviations of one surface",
         "suites real and attacks",
         "give images with less noise, a mask that leaves more, or a larger pixel size for matching",
         _weak,
@@ -228,15 +226,15 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "pixel-locked content",
-        "both images have the same content, pixel by pixel, such as labels or clouds, "
-        "with edges sharper than those of ground, or beside one another; or without it less than a "
-        "quarter of the chips is left, a second place matches about as well or is a peak of "
-        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, or their mean similarity is below "
-        f"{WEAK_HEIGHT:g}; of a copy, or one camera's views, with sharp edges, a quarter is left "
-        "that is below that or has such a place; but cameras' images that are displaced as ground "
-        "is, by more than "
-        f"{NOMINAL_PX:g} px on the map and by no whole pixels to {WHOLE_TIMES_EXACT * EXACT_PX:g} "
-        f"px, may have sharp edges where {MOVED_GROUND_SHARE:g} of what is left varies alike",
+        "both images have the same content, pixel by pixel, such as labels or clouds. Its edges "
+        "are sharper than edges of the ground, or lie beside one another. Or, without it, less "
+        "than a quarter of the chips is left, their mean similarity is below "
+        f"{WEAK_HEIGHT:g} robust standard deviations, or a second place matches about as well or "
+        f"is a peak of {REST_PEAK_DEVIATIONS:g}. Copies and views of one camera are refused only "
+        "if edges are sharp, and a quarter of the chips is left that is as weak or has such a "
+        "place. Camera images that are displaced as ground is, by more than "
+        f"{NOMINAL_PX:g} px on the map and {WHOLE_TIMES_EXACT * EXACT_PX:g} px from whole pixels, "
+        f"may have sharp edges if {MOVED_GROUND_SHARE:.0%} of the rest varies alike",
         "suites margins and attacks",
         WITHOUT,
         _locked,
@@ -244,10 +242,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "unexplained elsewhere",
-        "what the reference does not explain of the input, by lines through grey values in windows "
+        "the input, without what a line through the grey values of both images explains in windows "
         f"of {WINDOW_PX} px, correlates in phase with the reference at a second place: a peak of "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations more than {_ROOFS_PX:g} px off, or, "
-        f"of copies and one camera's views, of {PEAK_DEVIATIONS:g} nearer",
+        f"for copies and views of one camera, of {PEAK_DEVIATIONS:g} nearer",
         "[Kuglin1975]; suites margins, one_grid and attacks",
         WITHOUT,
         _unexplained_elsewhere,
@@ -255,7 +253,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "rest elsewhere",
-        "between two radar images, without what they have in common, pixel by pixel, "
+        "between two radar images, without the content that both have pixel by pixel, "
         "a second place matches about as well, and "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual, and a part lies "
         "elsewhere",
@@ -266,10 +264,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "nothing else in common",
-        "of images that are no two radars' or one camera's, both without windows that vary alike "
-        "and without the surroundings of edges that coincide, the mean similarity of chips all "
-        f"over is below {LEAST_OF_REST:g} times the robust standard deviation of one of them; "
-        "unless a mask leaves the ground alone",
+        "the mean similarity of chips all over is below "
+        f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
+        "vary alike and without the surroundings of edges that coincide. Not asked of two radar "
+        "images, of copies and views of one camera, and where a mask leaves the ground alone",
         "suites real and attacks",
         WITHOUT,
         _nothing_else,
