@@ -1,4 +1,4 @@
-"""What a verdict rests on: the numbers and facts that the rules of `rules.RULES` read."""
+"""The evidence for a verdict: numbers and facts that the rules of `rules.RULES` read."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REFINEMENT, SERIES = "refinement", "series"
 
 
 class Evidence(Protocol):
-    """What a verdict rests on; its stages name the rules that read it."""
+    """The basis of a verdict; its stages name the rules that read it."""
 
     @property
     def stages(self) -> Collection[str]: ...
@@ -42,14 +42,14 @@ class Evidence(Protocol):
 
 @dataclass(frozen=True)
 class ImagesEvidence:
-    """What is known of a pair before anything is matched, and is asked of what matched, too.
+    """Facts about a pair that are known before matching, and judged again after it.
 
     Parameters
     ----------
     scene
-        What the images are.
+        Facts about the images.
     mask
-        What takes part.
+        Which mask of the ground is used.
     max_error_px
         Largest error that is accepted, in matching pixels.
     """
@@ -63,7 +63,7 @@ class ImagesEvidence:
 
 @dataclass(frozen=True)
 class SearchEvidence:
-    """That a search or a fit came to no transform at all.
+    """The failure of a search or a fit to find any transform.
 
     Parameters
     ----------
@@ -78,12 +78,12 @@ class SearchEvidence:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How points that took no part in a fit agree with it.
+    """How held-out points agree with a fit.
 
     Parameters
     ----------
     name
-        What they are called, such as "check points".
+        Name of the points, such as "check points".
     agreeing, total
         How many agree with the model, and how many there are.
     log10_chance
@@ -91,11 +91,11 @@ class Agreement:
     rmse_px
         Root mean square error of inliers.
     max_error_px
-        The largest that is accepted.
+        The largest root mean square error that is accepted.
     spread_px
         Standard deviation of the model's predictions (root mean square).
     area
-        What the predictions are for, such as "the overlap".
+        The area of the predictions, such as "the overlap".
     accuracy
         The error of the transform at a random place of the area.
     least_share
@@ -125,20 +125,20 @@ class Agreement:
         least_share: float = SMALLEST_INLIER_SHARE,
         least_spread_px: FloatArray | float = 0.0,
     ) -> Agreement:
-        """Return how points agree by what is known of a transform's error.
+        """Return how points agree, by the error model of a transform.
 
         Parameters
         ----------
         error
-            Its check points are those with a peak.
+            The error model; its check points are those with a peak.
         total
-            How many points there are, with and without one.
+            How many points there are, with and without a peak.
         places_px
             Places all over the area, shape (n, 2).
         tries
             How many registrations were tried, any of which might agree by chance.
         least_spread_px
-            Standard deviation that the model's predictions there have at least, shape (n,).
+            Lower limit of the standard deviation of the model's predictions there, shape (n,).
         """
         misses = error.check
         chance = min(misses.log10_chance(total) + math.log10(tries), 0.0)
@@ -158,25 +158,25 @@ class Agreement:
 
     @property
     def largest_ce90_px(self) -> float:
-        """Largest radius of 90 % that is accepted: that of errors as large as the largest."""
+        """Largest CE90 that is accepted: that of the largest root mean square error."""
         return ce90_of_rmse(self.max_error_px)
 
 
 class EvidenceOfPoints(Evidence, Protocol):
-    """Evidence of which points that took no part in a fit are a part.
+    """Evidence that includes held-out points.
 
     Parameters
     ----------
     judged
-        What the points confirm or not, in words.
+        What the points confirm or refute, in words.
     held_out
         How the points agree.
     fit_points, fit_points_used
         How many points the fit had, and how many of them it used.
     metres_per_px
-        Side of a pixel that errors are in, on the ground; None: not known.
+        Ground size of the pixels that errors are measured in; None: not known.
     extrapolated_share
-        Share of the area outside of the hull of the points that hold the model.
+        Share of the area outside of the hull of the points that determine the model.
     """
 
     @property
@@ -195,27 +195,27 @@ class EvidenceOfPoints(Evidence, Protocol):
 
 @dataclass(frozen=True)
 class RegistrationEvidence(ImagesEvidence):
-    """What is known of a registration that came as far as check points.
+    """Evidence for a registration that has check points.
 
     Parameters
     ----------
     estimate
         The transform and the points of the fit.
     check
-        Check points, searched for around what the transform predicts.
+        Check points, searched for around the positions that the transform predicts.
     grid
         The matching grid, cut to the overlap.
     tries
         How many registrations were tried, any of which might agree by chance.
     layover_factor
-        How many times what heights scatter matched points by, they displace the model; None: not
-        two radar images.
+        Ratio of the displacement of the model by heights to the scatter of matched points by
+        heights; None: not two radar images.
     surveys
-        What chips all over the overlap show.
+        Surveys by chips all over the overlap.
     input_fit
-        How well a surface model fits the registered input; None: nothing is expected of it.
+        How well a surface model fits the registered input; None: it predicts nothing of it.
     exchanged
-        How check points of the pair with exchanged roles agree; None: nobody asked for them.
+        How check points of the pair with exchanged roles agree; None: they were not needed.
     """
 
     estimate: Estimate
@@ -252,7 +252,7 @@ class RegistrationEvidence(ImagesEvidence):
 
     @cached_property
     def residuals_px(self) -> FloatArray:
-        """Their residuals, in matching pixels, shape (n, 2)."""
+        """Residuals of the counted check points, in matching pixels, shape (n, 2)."""
         return self.counted.residual_on(self.grid, self.estimate.transform)
 
     @cached_property
@@ -265,16 +265,16 @@ class RegistrationEvidence(ImagesEvidence):
     def needs_second_confirmation(self) -> bool:
         """Whether so few check points agree that the exchanged pair must confirm the transform.
 
-        By chance, both pass with about the square of the limit: agreement that is as improbable
-        already needs no second pass.
+        By chance, both pass with a probability of about the square of the limit. Agreement that is
+        already as improbable needs no second pass.
         """
         return self.held_out.log10_chance > 2 * LARGEST_LOG10_CHANCE
 
     @cached_property
     def error(self) -> ErrorModel:
-        """What is known of the transform's error, in matching pixels.
+        """The model of the transform's error, in matching pixels.
 
-        Heights displace all points alike, and so does what of a town is no ground.
+        Its common part is the displacement of all points alike by heights and elevated objects.
         """
         places = self.grid.map_to_pixel(self.counted.reference_xy)
         misses = Misses(places, self.residuals_px, CHECK_RADIUS_PX, self.max_error_px)
@@ -308,14 +308,13 @@ class DateEvidence:
     rejected
         How many were accepted, but contradict the rest of the network.
     open_loops, loops
-        How many ways around it and two other dates do not lead back, and how many there are.
+        How many loops over it and two other dates do not close, and how many loops there are.
     is_reached
         Whether links lead to it from the reference, or from most of the other dates.
     is_confirmed
         Whether a second way leads to it.
     is_refused_by_hub
-        Whether its registration to the reference, or to the date that most are linked with, was
-        refused.
+        Whether its registration to the reference, or to the date with the most links, was refused.
     """
 
     failure: str = ""
@@ -337,7 +336,7 @@ class DateEvidence:
 
 
 def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
-    """Return the share of an image of a size, (width, height), that the hull of points covers."""
+    """Return the share of an image of `size`, (width, height), that the hull of points covers."""
     if len(px) < 3 or not np.isfinite(px).all():
         return 0.0
     area = cv2.contourArea(cv2.convexHull(px.astype(np.float32)))

@@ -1,8 +1,8 @@
-"""How far heights displace what matches, by how it scatters.
+"""Displacement of matches by heights, estimated from their scatter.
 
-Layover and relief displacement move elevated objects by other amounts from other views, but
-anywhere in a pair along the same line on the map. So heights show in where chips match: exact
-across this line and scattered along it, where errors of matching go in all directions.
+Layover and relief displacement move elevated objects by amounts that depend on the view, but
+everywhere in a pair along the same line on the map. Heights therefore scatter matched chips along
+this line and not across it, whereas matching errors go in all directions.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from ..geometry.misses import Misses
 from ..matching.survey import SURVEY_RADIUS_PX, Survey
 from ..rasters.grid import FloatArray
 
-# A model through elevated objects is off by the mean of their heights, which is as many times what
-# they scatter by. Measured by the suite sar_sar: 2 to 6 with keypoints; 7 to 9 with chips, which
-# see several heights at once. A plain of roofs scatters little.
+# Ratio of the mean displacement by heights, by which a model through elevated objects is off, to
+# their scatter. Measured by the suite sar_sar: 2 to 6 with keypoints; 7 to 9 with chips, which see
+# several heights at once. Roofs of one height scatter little.
 KEYPOINTS_MEAN_OVER_SCATTER = 3.0
 CHIPS_MEAN_OVER_SCATTER = 6.0
 
-# The same of heights that spread evenly from the ground up: mean over standard deviation.
+# The same ratio for heights that are distributed evenly from the ground up.
 _EVEN_MEAN_OVER_SCATTER = math.sqrt(3)
 
-# Scatter along a line is that of heights unless chance explains it with more than 5 %, as usual.
+# Scatter along a line is due to heights unless chance explains it at the usual level of 5 %.
 _SIGNIFICANCE = 0.05
 
 
 def mean_of_heights_px(
     survey: Survey | None, layover_factor: float | None, max_error_px: float
 ) -> FloatArray:
-    """Return what heights displace all matches by on average, as they scatter chips, shape (2,).
+    """Return the mean displacement of all matches by heights, from chips' scatter, shape (2,).
 
-    So far they may displace all to either side where a mask left more ground than heights; twice
-    as far where the ground may be the lowest of what matched.
+    All may be displaced by as much to either side where a mask leaves more ground than elevated
+    objects. Callers double it where the ground may be the lowest of what matched.
     """
     if survey is None or len(survey.centres) == 0:
         return np.zeros(2)
@@ -45,10 +45,10 @@ def mean_of_heights_px(
 
 
 def scatter_along_line(residuals_px: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return what residuals scatter by along a line beyond what they do across it.
+    """Return the scatter of residuals along a line in excess of the scatter across it.
 
-    n pairs of normal variates are as far from spherical as w, or further, with probability
-    w^((n − 2) / 2). Source: [Mauchly1940].
+    n pairs of normal variates have a sphericity of w or less with probability w^((n − 2) / 2).
+    Source: [Mauchly1940].
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def scatter_along_line(residuals_px: FloatArray, weights: FloatArray) -> FloatAr
     Returns
     -------
     float64 array (2,)
-        Along the line, as long as the standard deviation; 0 if chance may do so, too.
+        Along the line, as long as the standard deviation; 0 if chance may explain it.
     """
     count = float(weights.sum())
     if count < 3:

@@ -1,7 +1,6 @@
-"""What takes part in a registration: the ground of a town or of the country, by a radar image.
+"""Masks of the ground, of a town or of the country, that is found in a radar image.
 
-Whatever a mask comes from, the user or the radar image, it becomes the same thing: a raster that
-masks one image of the pair (see `user_masks`).
+As masks of the user do, they become a raster that masks one image of the pair (see `user_masks`).
 """
 
 from __future__ import annotations
@@ -18,37 +17,37 @@ from ..rasters.pair import ImagePair
 from .scene import SceneInfo
 from .user_masks import with_mask
 
-# Elevated objects of a town displace all points alike. Along an axis, as standard deviation: by so
-# many matching pixels, of whatever size, where the ground that its radar image shows is matched
-# (suites city, seeds 300 to 339, and towns, seeds 131 to 150: with 0.5 px CE90 holds 47 of 59
-# errors, with this 53), more where the camera looks obliquely (suite rpc_city, seeds 60 to 74), and
-# by so many metres where all is (suite coarse_towns). Between forests, houses and rims of forests
-# are left (suite calibration, SAR–SAR, rural, same orbit, seeds 480 to 599: without it CE90 holds
-# 79 % of errors).
+# Displacement of all points alike by elevated objects: standard deviation along an axis.
+# In a town, where only the ground that its radar image shows is matched: in matching pixels of
+# whatever size (suites city, seeds 300 to 339, and towns, seeds 131 to 150: with 0.5 px CE90 holds
+# 47 of 59 errors, with this 53), more where the camera looks obliquely (suite rpc_city, seeds 60 to
+# 74). Where all of the town is matched: in metres (suite coarse_towns).
+# Open ground still contains houses and rims of forests (suite calibration, SAR–SAR, rural, same
+# orbit, seeds 480 to 599: without it CE90 holds 79 % of errors).
 _ON_GROUND_PX, _OBLIQUE_PX, _WHOLE_M = 0.65, 0.9, 10.0
 _OPEN_PX = 0.15
 
-# Where open ground is more than this share of the reference, it is the same registration again,
-# and no other evidence than what was refused. Right ones by open ground had up to 90 %; one that
-# was 12 px wrong, of a forest that the mask missed, 99 % (suite attacks: overlay on aligned ground/
-# JPEG blocks/simss-rural/match_sar_sar/34004).
+# With more than this share of open ground, the masked registration repeats the refused one and adds
+# no evidence. Correct registrations by open ground had up to 90 %; one that was 12 px wrong, in a
+# forest that the mask missed, had 99 % (suite attacks: overlay on aligned ground/JPEG blocks/
+# simss-rural/match_sar_sar/34004).
 _MOST_OPEN = 0.95
 
 
 @dataclass(frozen=True)
 class Masked:
-    """A pair of which a part takes part.
+    """A pair with all masks, as it is matched.
 
     Parameters
     ----------
     pair
-        The images with all masks: what is matched.
+        The images with all masks.
     scene
-        What the images are.
+        Facts about the images.
     used
-        Which mask was made.
+        Which mask of the ground was made.
     surface
-        What a surface model lets expect; None: there is none.
+        The ground by a surface model; None: there is no model.
     """
 
     pair: ImagePair
@@ -63,7 +62,7 @@ class Masked:
     def exchanged(self) -> Masked:
         """Return the same masks with the roles of both images exchanged.
 
-        What is known of the images still names them by their first roles.
+        `scene` still names the images by their original roles.
         """
         return replace(self, pair=self.pair.exchanged())
 
@@ -71,17 +70,17 @@ class Masked:
 def with_ground_mask(
     pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context
 ) -> Masked:
-    """Return a pair with a mask of the ground if a radar image of a town lies beside a camera's.
+    """Return a pair, masked to the ground if it is a radar image of a town and a camera image.
 
-    Where buildings stand close, roofs and walls agree with each other at check points, too: the
-    ground alone takes part.
+    Where buildings stand close, roofs and walls agree with each other even at check points, so only
+    the ground takes part.
 
     Parameters
     ----------
     pair
         The images, with the masks that the user gave.
     scene
-        What the images are.
+        Facts about the images.
     stack
         Keeps the mask's raster until it is closed.
     context
@@ -105,10 +104,10 @@ def with_ground_mask(
 def ground_instead(
     pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context
 ) -> Masked | None:
-    """Return a pair of which the ground takes part that a radar image shows; None: it shows none.
+    """Return a pair masked to the ground that a radar image shows; None: no such mask applies.
 
-    Of what may be a town, beside a camera's image; and of any two radar images, if most of the
-    reference is open ground, and not all: less must not outvote the rest.
+    It applies to a possible town beside a camera image. It also applies to any two radar images if
+    open ground covers most of the reference, but not all: a minority must not outvote the rest.
     """
     if scene.has_user_mask:
         return None
@@ -125,7 +124,7 @@ def ground_instead(
 
 
 def _of_town(pair: ImagePair, scene: SceneInfo, stack: ExitStack, context: Context) -> Masked:
-    """Return a pair of whose radar image the ground of a town alone takes part."""
+    """Return a pair whose radar image is masked to the ground of a town."""
     radar, name = scene.radar.scene, scene.radar_name
     ground = find_ground(radar, context.progress)
     masked, share = with_mask(pair, name, radar, ground.select, stack, context)

@@ -52,7 +52,7 @@ _LOG = logging.getLogger(__name__)
 # How many surfaces of the best and of the worst check points a report shows.
 _EXTREMES = 3
 
-# What is asked for outside of a tool's call, and is checked as its parameters are.
+# Arguments given outside of a tool's call, which are checked as its parameters are.
 _READ = RasterIn(help="A raster that is read.")
 _WARPED = RasterOut(help="The registered raster.", suffixes=(*GEOTIFF, VRT))
 _REPORT = FileOut(help="An HTML page.", suffixes=(".html",), numbers=True)
@@ -65,16 +65,16 @@ _WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=MO
 class Registration:
     """A judged registration.
 
-    Its rasters stay open until it is closed, is left as a context manager, or is forgotten.
+    Its rasters stay open until it is closed, its `with` block ends, or it is garbage-collected.
 
     Parameters
     ----------
     pair
-        The images, with the masks of what took part.
+        The images with all masks.
     spec
         How they were registered.
     scene
-        What they are.
+        Facts about the images.
     mask
         Which mask was used.
     verdict
@@ -82,17 +82,17 @@ class Registration:
     check
         The check points, with their surfaces; None without a transform.
     evidence
-        What the verdict rests on; None without a transform.
+        The basis of the verdict; None without a transform.
     parameters
-        What the tool was called with.
+        The parameters that the tool was called with.
     started
         When the work began, by `time.perf_counter`.
     files
-        What was written, by name.
+        The files that were written, by name.
     tried
-        What was tried before, a line each.
+        The ways that the tool `register` tried, a line each.
     beyond
-        What of the written image lies outside of the overlap; None: nothing.
+        The part of the written image outside of the overlap; None: there is none.
     rasters
         Closes the images and masks.
     """
@@ -129,12 +129,12 @@ class Registration:
         return TiePoints.concatenate([self.evidence.estimate.points, self.evidence.check])
 
     def accepted(self) -> Transform:
-        """Return the transform of a registration that was accepted, so that has one."""
+        """Return the transform of an accepted registration."""
         assert self.verdict.accepted and self.transform is not None
         return self.transform
 
     def require_accepted(self, done: str = "registered to") -> None:
-        """Raise `NotRegisteredError` if it was refused; `done` is what was not done."""
+        """Raise `NotRegisteredError` if it was refused; `done` names what was not done."""
         if not self.verdict.accepted:
             input, reference = (
                 image.source.path for image in (self.pair.input, self.pair.reference)
@@ -155,13 +155,13 @@ class Registration:
     ) -> Raster | None:
         """Resample a raster by the transform, once.
 
-        What of it lies beyond the overlap is logged as a warning (see `beyond_overlap`).
+        If a part of it lies beyond the overlap, a warning is logged (see `beyond_overlap`).
 
         Parameters
         ----------
         raster
-            What `open_raster` takes: another band, date or resolution of the input, with its
-            nominal geotransform; None: the input.
+            A raster as `open_raster` takes it: another band, date or resolution of the input, with
+            the input's nominal geotransform; None: the input.
         output
             The GeoTIFF to write; None: the registered raster is returned.
         grid
@@ -176,8 +176,8 @@ class Registration:
         GeoreferencingError, NoOverlapError
             The raster lies elsewhere than the input.
         ParameterError
-            There is no such grid, resampling or number of threads; the output is no name of a
-            raster that can be written, or pixels without an output are to stay untouched.
+            There is no such grid, resampling or number of threads; the output does not name a
+            raster that can be written; or the grid is "untouched" without an output.
         SameFileError
             The output is the raster, or was read by the registration.
         OutputError
@@ -209,16 +209,16 @@ class Registration:
             return warp_to_array(source, to_px, target, resampling, workers=context.workers)
 
     def beyond_overlap(self, grid: str, transform: Transform | None = None) -> BeyondOverlap | None:
-        """Return what of a registered raster lies where nothing has checked the transform.
+        """Return the part of a registered raster where nothing has checked the transform.
 
-        None: nothing of it, as on the reference's grid.
+        None: there is no such part, as on the reference's grid.
 
         Parameters
         ----------
         grid
             One of `registered_output.OUTPUT_GRIDS`.
         transform
-            That of the raster; None: of the input.
+            The raster's transform; None: the input's.
 
         Raises
         ------
@@ -247,9 +247,9 @@ class Registration:
     def _check_written(
         self, name: str, kind: WrittenKind, path: Path, warped: RasterSource | None = None
     ) -> None:
-        """Raise `SameFileError` or `OutputError` if a file would be written over what is read.
+        """Raise `SameFileError` or `OutputError` if a file would overwrite one that is read.
 
-        That is what is warped, the images, and what else the registration was called with.
+        These are the warped raster, the images, and all other inputs among the parameters.
         """
         read: dict[str, Any] = {
             parameter: value
@@ -307,12 +307,12 @@ class Registration:
         return lines + file_lines(self.files)
 
     def __repr__(self) -> str:
-        # Not of all fields, which hold arrays and open rasters.
+        # The default would show all fields, which hold arrays and open rasters.
         word = "accepted" if self.verdict.accepted else "refused"
         return f"<{type(self).__name__} {word}: {self.verdict.reason}>"
 
     def close(self) -> None:
-        """Close the rasters; what was computed stays."""
+        """Close the rasters; results stay available."""
         self.rasters.close()
 
     def __enter__(self) -> Registration:

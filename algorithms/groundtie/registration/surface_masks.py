@@ -1,7 +1,8 @@
-"""The mask that a surface model and the views of both images make, and whether the model fits.
+"""The mask from a surface model and the views of both images, and whether the model fits.
 
-The mask lies on the reference, which lies right on the map as the model does: it holds the ground
-that neither image lays over, hides or shades. Where the input lies is not known before.
+The mask keeps the ground without layover, occlusion or shadow in either image. It lies on the
+reference, which, like the model, is placed correctly on the map. The input's place is not yet
+known.
 """
 
 from __future__ import annotations
@@ -28,25 +29,26 @@ from .scene import SceneInfo, scene_of
 from .specification import StatedSurface
 from .user_masks import UserMask, with_mask
 
-# How far off the surface model is looked for.
+# Search radius for the surface model.
 _REACH_PX = 24
 
-# Images correlate with models of other places by up to 0.03, with their own by 0.27 and more, of
-# dense cities by 0.44. Under a view rotated by 90° or more it was up to 0.31; where such a
-# registration was accepted, one of the images had 0.17 or less (suite towns).
+# Least correlation of an image with the model of its place. With models of other places it is up to
+# 0.03; with the right one 0.27 and more, 0.44 in dense cities. With a view rotated by 90° or more
+# it was up to 0.31; where such a registration was accepted, one of the images had 0.17 or less
+# (suite towns).
 CLEAR_CORRELATION = 0.2
 
-# The same of a radar image with the model that it was registered to, layover and all: with rough
-# models by 0.56 and more, also with an azimuth 15° off; from 90° off on, by 0.31 or less.
+# The same for a radar image and the model that it was registered to, rendered with layover: 0.56
+# and more with rough models, also with an azimuth 15° off; 0.31 or less from 90° off on.
 RENDERED_CORRELATION = 0.4
 
-# The edges of objects, and those that the model does not know, displace all points alike by so much
-# along an axis (standard deviation), in matching pixels. Measured on suites rpc_city, seeds 75 to
-# 84, and towns, seeds 131 to 140: without it CE90 holds 26 of 38 and 14 of 20 errors, with it 34
-# and 17.
+# Displacement of all points alike by the edges of objects and by objects that the model lacks:
+# standard deviation along an axis, in matching pixels. Measured on suites rpc_city, seeds 75 to 84,
+# and towns, seeds 131 to 140: without it CE90 holds 26 of 38 and 14 of 20 errors, with it 34 and
+# 17.
 _ON_MODELLED_GROUND_PX = 0.25
 
-# Of the mean: what is darker counts for as dark as that.
+# Lower limit of brightness before the logarithm, as a share of the mean.
 _DARKEST = np.float32(0.01)
 
 
@@ -60,7 +62,7 @@ def with_surface_mask(
     pair
         The images, with the masks that the user gave.
     scene
-        What the images are.
+        Facts about the images.
     stated
         The surface model and the views.
     stack
@@ -84,9 +86,9 @@ def with_surface_mask(
 def fitted_ground(
     scene: Scene, stated: StatedSurface, stack: ExitStack
 ) -> tuple[SurfaceGround, ModelFit | None]:
-    """Return the ground that all views show, by a model that is moved to where a scene shows it.
+    """Return the ground that all views show, by a model moved to fit a scene, and the fit.
 
-    How it fits there is None where the view does not let expect anything.
+    Only a clear fit moves the model. The fit is None where the view predicts nothing.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ def fitted_ground(
 
 
 def rendered_surface(image: Image, view: View, stack: ExitStack, context: Context) -> Image:
-    """Return a surface model as a radar image from a view: a file until the stack is closed."""
+    """Return a surface model rendered as a radar image; its file exists until the stack closes."""
     model = RasterModel(image.source, image.band or 1)
     ground = SurfaceGround(Scene.of(image.source, image.band), model, (view,))
     path = stack.enter_context(scratch_folder()) / "image.tif"
@@ -131,9 +133,9 @@ class ModelFit:
     Parameters
     ----------
     correlation
-        Of an image's logarithm with what the model lets expect, at the best place.
+        Of an image's logarithm with the image expected from the model, at the best offset.
     offset_px
-        That place: columns and rows by which the image shows it elsewhere.
+        The best offset: columns and rows by which the image shows the model elsewhere.
     least
         The least correlation of an image that shows the model.
     """
@@ -149,7 +151,7 @@ class ModelFit:
 
     @property
     def note(self) -> str:
-        """What a user should know of it; empty: it lies right."""
+        """A note for the user; empty: the model lies right."""
         if not self.is_clear:
             return ", of which it shows nothing"
         right, down = self.offset_px
@@ -162,15 +164,15 @@ def fit_of(ground: SurfaceGround, view: View, read: Callable[[Window], Patch]) -
     Parameters
     ----------
     ground
-        What the model lets expect.
+        The ground by the model.
     view
-        From where the image was taken.
+        The view of the image.
     read
         Returns the image in a window of the reference.
 
     Returns
     -------
-    None where the view does not let expect anything: that of a camera without the sun's place.
+    None where the view predicts nothing: that of a camera without the sun's position.
     """
     window = middle_window(ground.scene.grid)
     patch, expected = read(window), ground.level(window, view)
@@ -180,14 +182,14 @@ def fit_of(ground: SurfaceGround, view: View, read: Callable[[Window], Patch]) -
 
 
 def fit_of_images(rendered: Patch, image: Patch) -> ModelFit:
-    """Return how well an image fits one that was rendered of a surface model."""
+    """Return how well an image fits one that was rendered from a surface model."""
     both = replace(image, valid=image.valid & rendered.valid)
     fit = _fit(_level(replace(rendered, valid=both.valid)), both)
     return replace(fit, least=RENDERED_CORRELATION)
 
 
 def _fit(expected: FloatImage, patch: Patch) -> ModelFit:
-    """Return how well the logarithm of an image fits what is expected where it is valid."""
+    """Return how well the logarithm of an image, where it is valid, fits the expected image."""
     if not patch.valid.any():
         return ModelFit(0.0, (0, 0))
     surface = _correlation(_centred(expected, patch), _centred(_level(patch), patch))
@@ -210,6 +212,6 @@ def _centred(values: FloatImage, patch: Patch) -> FloatImage:
 
 
 def _correlation(model: FloatImage, image: FloatImage) -> FloatImage:
-    """Return the correlation of an image with a model that is moved, (2 r + 1, 2 r + 1)."""
+    """Return the correlation of an image with the model at all shifts, (2 r + 1, 2 r + 1)."""
     energy = max(float(np.linalg.norm(model) * np.linalg.norm(image)), 1e-12)
     return products_at_shifts(model, image, _REACH_PX) / energy

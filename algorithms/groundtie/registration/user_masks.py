@@ -1,7 +1,6 @@
 """Masks that the user gave, or that a mission delivers with an image.
 
-Whatever they are, rasters, vector layers or classifiers, they become the same thing: a raster that
-masks one image of the pair.
+Rasters, vector layers and classifiers all become a raster that masks one image of the pair.
 """
 
 from __future__ import annotations
@@ -41,8 +40,8 @@ class UserMask:
     mask
         A raster, a vector layer or a classifier.
     values
-        What of it takes no part, see `masks.values`; None: zeros of a raster, what lies outside of
-        a vector layer.
+        The values that take no part, see `masks.values`; None: zeros of a raster, the outside of a
+        vector layer.
     origin
         Words on where it was found; empty: the user gave it.
     """
@@ -53,19 +52,19 @@ class UserMask:
 
     @classmethod
     def of(cls, image: Any, mask: Any, values: str | None) -> UserMask | None:
-        """Return the mask of an image as it was asked for, or the one that lies beside it.
+        """Return the requested mask of an image, or the one that lies beside it.
 
         Parameters
         ----------
         image
             The image, as `open_raster` takes it.
         mask, values
-            What was asked for; values "none" without a mask: none is looked for.
+            The requested mask and values; values "none" without a mask: none is looked for.
 
         Raises
         ------
         ParameterError
-            The values are none, or there is no mask that has them.
+            The values are invalid, or there is no mask that they belong to.
         """
         if mask is None and values not in (None, NONE):
             raise ParameterError(f"there is no mask that the values {values} belong to")
@@ -99,7 +98,7 @@ class UserMask:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is a raster, or a layer of what takes no part: others depend on the pair."""
+        """Whether it is a raster, or a layer of areas to leave out: others depend on the pair."""
         return self.is_raster or (self.is_layer and self.values is not None)
 
     @property
@@ -108,12 +107,12 @@ class UserMask:
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Its name in messages."""
         named = isinstance(self.mask, (str, Path))
         return file_name(self.mask) if named else str(getattr(self.mask, "name", "the mask"))
 
     def noted(self, image: Image, share: float, of: object) -> Image:
-        """Return an image that states of this mask what it means, and which share it keeps."""
+        """Return an image with a note on this mask and the share that it keeps."""
         note = f"{self.name}{self.origin} keeps {share:.0%} of {of}"
         return replace(image, mask_note=note, mask_hides=self.values is not None)
 
@@ -142,7 +141,7 @@ def with_user_masks(
     pair
         The images.
     masks
-        For the reference and the input a `UserMask`, or what one is made of; None: none.
+        For the reference and the input a `UserMask`, or a mask to make one of; None: no mask.
     stack
         Keeps the masks' rasters until it is closed.
     context
@@ -151,7 +150,7 @@ def with_user_masks(
     Returns
     -------
     pair, used
-        The pair, and the mask that a vector layer made, which is one of the ground; None: none.
+        The pair, and the mask of the ground that a vector layer made; None: there is none.
     """
     used = None
     for name, given in zip((REFERENCE, INPUT), masks, strict=True):
@@ -179,7 +178,7 @@ def with_user_masks(
 
 
 def select_drawn(scene: Scene, mask: UserMask, stack: ExitStack) -> Select:
-    """Return what selects the pixels of a scene that a layer, or a raster's values, keep."""
+    """Return a function that selects the pixels that a layer, or a raster's values, keep."""
     if mask.is_layer:
         layer = read_layer(mask.mask, scene, WIDTH_M)
         return replace(layer, is_outside=mask.values is not None).select
@@ -194,7 +193,7 @@ def _scene_classifier(pair: ImagePair, name: str, scene: Scene, path: Path) -> C
     Raises
     ------
     ParameterError
-        The file is no classifier, or one for an image of other bands.
+        The file is no classifier, or one for another number of bands.
     """
     classifier = read_classifier(path)
     (image, to_px), count = located(pair, name), len(scene.like.image_bands)
@@ -217,7 +216,7 @@ def with_mask(
 ) -> tuple[ImagePair, float]:
     """Return a pair with a mask on one image, and the share of it that takes part.
 
-    The mask is a file until the stack is closed.
+    The mask's file exists until the stack is closed.
     """
     mask, share = drawn_mask(scene, select, stack, context.quiet().progress)
     return replace(pair, **{name: getattr(pair, name).masked(mask, pair.grid)}), share
@@ -226,21 +225,21 @@ def with_mask(
 def drawn_mask(
     scene: Scene, select: Select, stack: ExitStack, progress: Progress
 ) -> tuple[RasterSource, float]:
-    """Return what takes part of a scene as a file until the stack is closed, and its share."""
+    """Return the mask of a scene, a file until the stack is closed, and the share it keeps."""
     path = stack.enter_context(scratch_folder()) / "mask.tif"
     share = write_mask(scene, path, select, progress)
     return stack.enter_context(open_raster(path)), share
 
 
 def draw_mask(source: RasterSource, mask: UserMask, stack: ExitStack, progress: Progress) -> Image:
-    """Return an image with a mask on its own pixels, so that it moves with these.
+    """Return an image with a mask on its own pixels, so that the mask moves with them.
 
     Parameters
     ----------
     source
         The image.
     mask
-        Its mask; `UserMask.is_drawn` states which are drawn.
+        Its mask, one of those that `UserMask.is_drawn`.
     stack
         Keeps the drawn mask until it is closed.
     progress
@@ -254,7 +253,7 @@ def draw_mask(source: RasterSource, mask: UserMask, stack: ExitStack, progress: 
 
 
 def _select_zeros(scene: Scene, mask: UserMask, stack: ExitStack) -> Select:
-    """Return what selects the pixels of an image that a raster keeps, by its zeros."""
+    """Return a function that selects the pixels of an image that a raster's zeros leave."""
     grid = scene.grid
     image = Image(scene.like).masked(stack.enter_context(open_raster(mask.mask)), grid)
 

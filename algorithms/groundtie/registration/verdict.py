@@ -19,12 +19,12 @@ from .rules import RULES, Rule
 class Verdict:
     """Whether a registration can be trusted.
 
-    Of refined RPCs, pixels are the image's, and the overlap is the image.
+    For refined RPCs, pixels are those of the image, and the overlap is the whole image.
 
     Parameters
     ----------
     accepted
-        Whether it can.
+        Whether it can be trusted.
     reason
         Why, or why not, in a sentence.
     fit_points, fit_points_used
@@ -45,11 +45,11 @@ class Verdict:
     advice
         What a user can try next; empty if it is accepted.
     is_final
-        Whether nothing else is tried after it: what is accepted, or refused by such a `Rule`.
+        Whether nothing else is tried after it: it is accepted, or refused by a final `Rule`.
     accuracy
-        What is predicted of the error of the transform at a random place.
+        Predicted error of the transform at a random place.
     ce90_m
-        Its radius of 90 % in metres, unless there is no georeferencing.
+        CE90 of that error in metres, unless there is no georeferencing.
     """
 
     accepted: bool
@@ -94,7 +94,7 @@ class Verdict:
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return the verdict as values that JSON can carry; what is not finite is None."""
+        """Return the verdict as values that JSON can carry; numbers not finite become None."""
         values = asdict(self)
         accuracy = values.pop("accuracy")
         ellipse, (low, high) = accuracy.pop("ellipse"), accuracy.pop("ce90_range_px")
@@ -122,7 +122,7 @@ def refusals(evidence: Evidence) -> Iterator[tuple[Rule, str]]:
 
 
 def decide(evidence: Evidence, confirmed: str = "") -> Verdict:
-    """Return what the rules make of evidence, without its numbers; `confirmed` is why it stands."""
+    """Return the rules' verdict on evidence, without numbers; `confirmed` is why it is accepted."""
     refusal = next(refusals(evidence), None)
     if refusal is None:
         return Verdict(True, confirmed)
@@ -131,12 +131,12 @@ def decide(evidence: Evidence, confirmed: str = "") -> Verdict:
 
 
 def judge_search(failure: GroundTieError) -> Verdict:
-    """Return the verdict on a registration whose search or fit came to no transform.
+    """Return the verdict on a registration whose search or fit found no transform.
 
     Raises
     ------
     GroundTieError
-        The failure itself, if no rule names it: it is no refusal, but bad input.
+        The failure itself, if no rule covers it: it is no refusal, but bad input.
     """
     verdict = decide(SearchEvidence(failure))
     if verdict.accepted:
@@ -145,7 +145,7 @@ def judge_search(failure: GroundTieError) -> Verdict:
 
 
 def judge(evidence: EvidenceOfPoints) -> Verdict:
-    """Return what the rules make of evidence, with the numbers that its held-out points give."""
+    """Return the rules' verdict on evidence, with the numbers of its held-out points."""
     points, metres = evidence.held_out, evidence.metres_per_px
     metres = math.nan if metres is None else metres
     verdict = replace(

@@ -1,13 +1,13 @@
 """The one list of rules by which registrations are refused.
 
-A rule looks at evidence and returns why it refuses, in a sentence, or None. Its stage is the kind
-of evidence that it reads (see `evidence`); `verdict.refusals` asks all rules of the evidence's
-stages in their order, and the first one that refuses decides. What may be tried after that,
-`is_final` states.
+A rule reads evidence and returns why it refuses, in a sentence, or None. Its stage is the kind of
+evidence that it reads (see `evidence`). `verdict.refusals` applies all rules of the evidence's
+stages in order; the first one that refuses decides. `is_final` states whether anything may be
+tried after that.
 
 Each stage has a module here, with its limits and their sources. To add a rule, write a function
-and put a `Rule` in the tuple of its module. docs/method-verdict.md is made from this list, and a
-test asks for evidence that triggers it and evidence that does not.
+and put a `Rule` in the tuple of its module. docs/method-verdict.md is generated from this list. A
+test demands evidence that triggers each rule and evidence that does not.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from .tie_points import TIE_POINT_RULES
 
 __all__ = ["RULES", "Rule"]
 
-# By the stage whose evidence they read, in the order in which they are asked.
+# By the stage whose evidence they read, in the order in which they are applied.
 RULES: Mapping[str, tuple[Rule, ...]] = {
     TIE_POINTS: TIE_POINT_RULES,
     BANDS: BANDS_RULES,

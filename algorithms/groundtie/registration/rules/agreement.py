@@ -1,4 +1,4 @@
-"""Rules on how many held-out points agree: with a registration, new or old, or refined RPCs."""
+"""Rules on how many held-out points agree with a registration, new or old, or refined RPCs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules on a registration that was made before, by points and ways back."""
+"""Rules on an existing registration, judged by points and by ways back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules on bands, which one transform registers: asked of every pair, and of poses, too."""
+"""Rules on bands, which share one transform: applied to every pair and to poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules on the error of a transform or of refined RPCs, and on how well points hold it."""
+"""Rules on the error of a transform or of refined RPCs, and on how well points determine it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def _large_error(evidence: EvidenceOfPoints) -> str | None:
 
 def _uncertain(evidence: EvidenceOfPoints) -> str | None:
     points = evidence.held_out
-    # What is not a number is not known to be small: it refuses.
+    # Negated, so that NaN refuses: it is not known to be small.
     if not points.spread_px <= points.max_error_px:
         spread = f"{points.spread_px:.2f} px over {points.area}"
         return f"the points do not hold the model: it varies by {spread}"
-    # Of assessed transforms, of which no fit is known, there is none.
+    # Assessed transforms, whose fit is unknown, have no CE90: NaN passes.
     if not points.accuracy.ce90_px > points.largest_ce90_px:
         return None
     return (

@@ -1,4 +1,4 @@
-"""Rules on what the images are: asked before anything is matched, and of what matched."""
+"""Rules on the kinds of images, applied before matching and again to its result."""
 
 from __future__ import annotations
 

@@ -9,10 +9,10 @@ from .rule import Rule
 if TYPE_CHECKING:
     from ..refinement import RefinementEvidence
 
-# Control must spread over so much of each side of an image (suite rpc).
+# Least share of each side of an image that control must span (suite rpc).
 _SMALLEST_EXTENT = 0.25
 
-# A bias that is folded into new RPCs may be missed by so much, in pixels.
+# Largest error, in pixels, of new RPCs that a bias is folded into.
 _LARGEST_FOLDING_PX = 0.01
 
 
@@ -25,7 +25,7 @@ def _narrow_control(evidence: RefinementEvidence) -> str | None:
 
 def _not_nearer(evidence: RefinementEvidence) -> str | None:
     before, after = evidence.before.rmse, evidence.after.rmse
-    # Without inliers both are not a number, and nothing shows that they are nearer.
+    # Without inliers both are NaN, which refuses: nothing shows that the points are nearer.
     if before > after:
         return None
     name = evidence.held_out.name

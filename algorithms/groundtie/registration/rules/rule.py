@@ -1,4 +1,4 @@
-"""What a rule is, and the advice that rules of several stages give."""
+"""A rule, and the advice that rules of several stages give."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Rule:
     Parameters
     ----------
     name
-        What it is called in verdicts and in the documentation.
+        Its name in verdicts and in the documentation.
     refuses
-        What it refuses, with its limit, for the documentation.
+        The condition that it refuses, with its limit, for the documentation.
     source
         Where the limit comes from.
     advice
@@ -28,10 +28,10 @@ class Rule:
     reason
         Returns why it refuses, in a sentence; None: it does not.
     is_final
-        Whether nothing else is tried after it. What images are, what repeats or is drawn over them,
-        and parts that lie elsewhere, no other mask or matcher mends, but may hide: noise, copies of
-        the reference and seams of mosaics passed tries that followed such refusals (once_wrong.txt
-        of the suite attacks).
+        Whether nothing else is tried after it. Another mask or matcher cannot mend unsuitable
+        images, repetition, overlays or parts that lie elsewhere, but may hide them: noise, copies
+        of the reference and seam lines of mosaics passed attempts that followed such refusals
+        (once_wrong.txt of the suite attacks).
     """
 
     name: str

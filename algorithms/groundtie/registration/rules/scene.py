@@ -1,4 +1,4 @@
-"""Rules on what matched, where the images show a town: its ground, or roofs."""
+"""Rules for images of towns, on whether the ground or the roofs matched."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ..evidence import RegistrationEvidence
 from ..surface_masks import CLEAR_CORRELATION, RENDERED_CORRELATION
 from .rule import ON_GROUND, Rule
 
-# An oblique view displaces fit and check points alike: by grey levels, where four sums of check
-# chips all agree, as in images of 700 px, the suite rpc_city has errors up to 6 px; with five and
-# more, below 1 px. By colours, where three agree, up to 2.7 px there, and 3.8 px in smaller images
-# (suite attacks); where four do, up to 2.4 px.
+# Fewest agreeing sums of check chips: an oblique view displaces fit and check points alike. Errors
+# by grey levels in the suite rpc_city: up to 6 px where four sums all agree, as in images of
+# 700 px; below 1 px with five and more. Errors by colours: where three agree, up to 2.7 px there,
+# and 3.8 px in smaller images (suite attacks); where four do, up to 2.4 px.
 _FEWEST_GREY, _FEWEST_IN_COLOURS = 5, 4
 
 # From this share of agreeing check points on, more agree than roofs alone do. Measured where a

@@ -1,4 +1,4 @@
-"""Rules on a search or a fit that came to no transform."""
+"""Rules on a search or a fit that found no transform."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .rule import WIDER, Rule
 
 def _ended_with(kind: type[GroundTieError]) -> Callable[[SearchEvidence], str | None]:
     def reason(evidence: SearchEvidence) -> str | None:
-        # An ambiguous place is a NothingFoundError, too, with a rule of its own.
+        # AmbiguousPlaceError is a NothingFoundError, too, but has a rule of its own.
         return str(evidence.failure) if type(evidence.failure) is kind else None
 
     return reason

@@ -1,4 +1,4 @@
-"""Rules of the scene on the survey: what chips all over the overlap match."""
+"""Rules on the survey: where chips all over the overlap match."""
 
 from __future__ import annotations
 
@@ -16,36 +16,38 @@ from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
 from .rule import ON_GROUND, WITHOUT, Rule
 
-# Chips all over are weakly similar below so many robust standard deviations. Measured on pairs that
-# were registered right: from 2.2 on; on images with much noise that were registered wrong: 1.5 to
-# 2.9 (suites real and attacks).
+# Mean similarity of the chips, in robust standard deviations, below which they match weakly.
+# Measured: from 2.2 on for correctly registered pairs, 1.5 to 2.9 for very noisy images that were
+# registered wrongly (suites real and attacks).
 WEAK_HEIGHT = 2.0
 
-# A quarter of the chips must have enough valid pixels in both images. All have where no mask is
-# used; on the ground of cities that were registered right 22 of 57 and more have, on snow of one
-# shape that was taken for the ground of a city 4 of 37. Without pixel-locked content, of right
-# transforms nine of ten have a quarter left, of noise that two radar images share 2 of 49. Copies
-# and one camera's views may leave less, plain copies at most an eighth. Where a quarter is left,
-# and edges are sharp, as those of clouds and snow of one shape are, it must be as high as of other
+# Least share of the chips with enough valid pixels in both images. Without a mask, all have enough.
+# On the ground of correctly registered cities, 22 of 57 and more have; on snow of one shape that
+# was taken for the ground of a city, 4 of 37. Without pixel-locked content, nine of ten correct
+# transforms keep a quarter; noise that two radar images share leaves 2 of 49. Copies and views of
+# one camera may leave less, plain copies at most an eighth. If a quarter is left and edges are
+# sharp, as those of clouds and snow of one shape, its similarity must reach the limit for other
 # content (suites city, margins and attacks; tests of masks).
 _LEAST_CHIPS = 0.25
 
-# Ground that lies elsewhere shows through clouds, labels, patterns of noise and copies as a peak of
-# its own, however high what is drawn is. In robust standard deviations of what is elsewhere, right
-# transforms reach 11.6, by canopies that are displaced, and one of twelve dense cities in pixels of
-# 2 m more; most of ground beneath what is drawn has 12.3 and more, some 10 to 12. Of what is left
-# without pixel-locked content, right transforms reach 4.4, but where more is drawn at another
-# place, or an orchard repeats (8.6 to 14.3); others from 6.5 on (suites real, calibration of large
-# rural scenes, seeds 440-565, and attacks: controls --seeds 33000-33039, --seeds 72000-72029,
-# once_wrong.txt). Of what the reference does not explain of the input, 72 of 85 right transforms
-# are lower; the others have 6.1 and more, by what is drawn at another place or repeats, two of them
-# refused by this alone (suite margins, --seeds 87000-87029 --sample 120; none of one_grid).
+# Height of a second place, in robust standard deviations of the similarity elsewhere. Beneath
+# clouds, labels, patterns of noise and copies, ground that lies elsewhere has a peak of its own,
+# however high that of the overlay is.
+# Whole survey: correct transforms reach 11.6, through displaced canopies; one of twelve dense
+# cities in pixels of 2 m has more. Most ground beneath overlays has 12.3 and more, some 10 to 12.
+# Without pixel-locked content: correct transforms reach 4.4, or 8.6 to 14.3 where more is drawn at
+# another place or an orchard repeats; wrong ones have 6.5 and more (suites real, calibration of
+# large rural scenes, seeds 440-565, and attacks: controls --seeds 33000-33039, --seeds 72000-72029,
+# once_wrong.txt).
+# Input that the reference does not explain: 72 of 85 correct transforms are lower; the others have
+# 6.1 and more, through content that repeats or is drawn at another place. This limit alone refuses
+# two of them (suite margins, --seeds 87000-87029 --sample 120; none of one_grid).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
 
-# Nearer, roofs of right transforms are such peaks, too: with 9 px in place of it, a suburb that is
-# right to 0.6 px is refused (suite attacks: images exchanged/0/sim-suburban/register/33012). One
-# camera's views show few; other ground that a copy was blended into has a peak far above the higher
-# limit (tests/matching/test_surveys.py).
+# Nearer than this, roofs make such peaks under correct transforms, too: with 9 px instead, a suburb
+# that is correct to 0.6 px is refused (suite attacks: images exchanged/0/sim-suburban/register/
+# 33012). Views of one camera have few such roofs; other ground that a copy was blended into has a
+# peak far above the higher limit (tests/matching/test_surveys.py).
 _ROOFS_PX = 12.0
 
 
@@ -73,9 +75,9 @@ def _has_rival(survey: Survey) -> bool:
 
 
 def deviations_elsewhere(survey: Survey) -> float:
-    """Return how far a second place stands out of what is elsewhere, in its deviations.
+    """Return the height of a second place, in robust deviations of the similarity elsewhere.
 
-    What is not as high as where the transform has it must be a peak.
+    Unless it is about as high as the transform's own place, it must be a peak.
     """
     height = survey.rival_height if _has_rival(survey) else survey.second_peak
     return height / survey.deviation_elsewhere
@@ -97,7 +99,7 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
 
 
 def has_few_chips(survey: Survey, chips: int) -> bool:
-    """Whether of so many chips too few have enough valid pixels to show something."""
+    """Whether too few of the chips have enough valid pixels to be evidence."""
     return survey.comparable < _LEAST_CHIPS * chips
 
 
@@ -109,7 +111,7 @@ def _confirms(left: Survey, rest: Rest) -> bool:
 
 
 def _locked(evidence: RegistrationEvidence) -> str | None:
-    """Ask of what is left what is asked of all; of copies and one camera's views it is little."""
+    """Judge the survey without shared content; copies and views of one camera may leave little."""
     rest = evidence.surveys.rest
     if rest is None or not rest.shared.is_evident:
         return None
@@ -125,9 +127,9 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
 
 
 def deviations_of_unexplained(surveys: Surveys, from_px: float = _ROOFS_PX) -> float:
-    """Return how far what the reference does not explain of the input stands out elsewhere.
+    """Return the height of a second place of the input that the reference does not explain.
 
-    At least so many pixels off. 0 where too little is left, as of copies.
+    It lies farther off than `from_px`. 0 if too few chips are left, as of copies.
     """
     left = surveys.unexplained
     if left is None or has_few_chips(left, len(left.centres)):
@@ -146,9 +148,10 @@ def _unexplained_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 
 def deviations_of_rest(rest: Rest | None) -> float:
-    """Return how far what two radar images leave stands out elsewhere, as a whole and in a part.
+    """Return the height of a second place of two radar images without their shared content.
 
-    0: it does not. Of right transforms, walls and canopies are now and then the one or the other.
+    0 unless the whole has a rival and a part lies elsewhere, too: under correct transforms, walls
+    and canopies now and then cause one or the other.
     """
     if rest is None or rest.shared.is_evident or rest.shared.sensors is not Sensors.RADARS:
         return 0.0
@@ -165,9 +168,10 @@ def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
 
 
 def height_of_else(rest: Rest | None) -> float:
-    """Return how high chips are without what images other than two radars' have in common.
+    """Return the mean similarity of chips without the content that both images share.
 
-    Without windows or edges, whichever is higher; infinite where it was not asked.
+    Of the surveys without shared windows and without shared edges, the higher; infinite if neither
+    was made or both images are a radar's.
     """
     if rest is None or rest.shared.is_evident or rest.shared.sensors is Sensors.RADARS:
         return math.inf

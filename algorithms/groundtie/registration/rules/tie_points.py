@@ -12,8 +12,8 @@ from .rule import Rule
 if TYPE_CHECKING:
     from ..tie_point_evidence import TiePointEvidence
 
-# Stored tie points must hold a model so well that an error of 1 px changes the raster by no more
-# than this share of its side: it would not look like itself.
+# Largest move of the raster's border by an error of 1 px in stored tie points, as a share of its
+# longer side. Beyond that, the raster would be distorted past recognition.
 _LARGEST_BORDER_SPREAD = 0.1
 
 
