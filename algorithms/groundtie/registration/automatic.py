@@ -32,7 +32,7 @@ from .sensor_input import Ground, OrientedImage
 from .sensor_jobs import refine
 from .specification import ANYWHERE, CHIPS, COREGISTER, OPTICAL, SAR_SAR, Specification
 
-# Georeferencing that is wrong by more than a shift: so far it is searched after shifts are refused.
+# Search range for georeferencing that is wrong by more than a shift, used if shifts are refused.
 _DOUBTED_DEG, _DOUBTED_SCALE = 10.0, 1.1
 
 
@@ -45,7 +45,7 @@ class Try:
     name
         The tool that does the same.
     spec
-        What it is asked for.
+        How the pair is registered.
     because
         Why it was chosen.
     """
@@ -56,12 +56,12 @@ class Try:
 
 
 def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
-    """Return what is tried on a pair, in this order.
+    """Return the ways to try on a pair, in this order.
 
     Parameters
     ----------
     scene
-        What the images are.
+        Facts about the images.
     is_georeferenced
         Whether they have georeferencing.
     """
@@ -72,7 +72,7 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
         because = "both images are a radar's, which share keypoints"
         tries = [Try("match_sar_sar", SAR_SAR, because), chips]
     else:
-        # Not declared: an image that lost its speckle may be a radar's all the same.
+        # Not declared to be cameras': an image without speckle may still be a radar's.
         spec = replace(OPTICAL, radar=COREGISTER.radar)
         because = "both images are a camera's, which share keypoints"
         tries = [Try("match_optical", spec, because), chips]
@@ -90,7 +90,7 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
 
 
 def plan_rendered(given: Mapping[str, Any]) -> Iterator[Try]:
-    """Yield what is tried where the reference is heights, by the values of a tool's parameters."""
+    """Yield the ways to try if the reference holds heights, by a tool's parameters."""
     if asked_surface_view(given) is not None:
         because = "the reference is a surface model, rendered as the radar image"
         yield Try("coregister", replace(COREGISTER, **asked_rendering(given)), because)
@@ -109,7 +109,7 @@ def register_anything(
     Raises
     ------
     NotRegisteredError
-        Everything that makes sense was refused.
+        Every way that makes sense was refused.
     """
     if _needs_rpcs(parameters["input"]):
         return _by_rpcs(parameters, progress)
@@ -126,9 +126,9 @@ def register_anything(
 def _first_accepted(
     call: Call, asked: Mapping[str, Any], ways: tuple[Try, ...], context: Context
 ) -> tuple[Registration, ExitStack]:
-    """Return the first registration that is accepted, or the first refusal if none is.
+    """Return the first registration that is final, accepted or refused; else the first refusal.
 
-    `asked` is what every way's specification is given; without `ways`, the images decide on them.
+    `asked` is added to every way's specification; without `ways`, the images decide on them.
     """
     tried: list[str] = []
     with ExitStack() as stack:
@@ -200,7 +200,7 @@ def _orthorectifier(ground: Ground, workers: int | None) -> WriteOutput:
 
     def write(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress) -> None:
         with threads(workers, progress) as context, ExitStack() as stack:
-            # Anew: by RPCs that were wrong, the heights of another region were read.
+            # Oriented again: with the wrong RPCs, heights of another region were read.
             crs = image.orientation.crs
             refined = ground.orient(image.source, fit.rpc, crs, stack, SILENT)
             write_orthoimage(refined, path, context)
@@ -208,7 +208,7 @@ def _orthorectifier(ground: Ground, workers: int | None) -> WriteOutput:
     return write
 
 
-# What `refine` takes and the tool `register` does not ask for.
+# Parameters of `refine` that the tool `register` does not have.
 _RPC_DEFAULTS: Mapping[str, Any] = {
     **dict.fromkeys(("gcps", "geoid", "height", "rpc", "search_radius", "matching_pixel_size")),
     "dem_cover": 0.0,

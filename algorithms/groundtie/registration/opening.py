@@ -1,4 +1,4 @@
-"""A pair of images, opened for its registration, on one matching grid and with the user's masks."""
+"""A pair of images, opened for registration on one matching grid, with the user's masks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class OpenPair:
     Parameters
     ----------
     images
-        The images without any mask: what keypoints may be described by.
+        The images without any mask, as keypoints are described in them.
     pair
         The images with the user's masks.
     user_mask
@@ -59,7 +59,7 @@ def open_pair(
     Parameters
     ----------
     reference, input
-        What `open_raster` takes.
+        Rasters as `open_raster` takes them.
     spec
         How far the input may lie off, and at which pixel size both are matched.
     context
@@ -67,8 +67,8 @@ def open_pair(
     bands
         Numbers of the bands that are matched, from 1; None: the mean of all.
     masks
-        For each image a `UserMask`, or a raster whose zeros take no part, a vector layer of what
-        takes part, or a classifier; None: all takes part.
+        For each image a `UserMask`, or a raster whose zeros take no part, a vector layer of the
+        areas that take part, or a classifier; None: the whole image takes part.
     """
     started = time.perf_counter()
     with ExitStack() as stack:
@@ -126,14 +126,14 @@ def pair_images(
 
 
 def usual_radius_m(reference: Grid, input: Grid, free: FreeSearch) -> float:
-    """Return how far the input of a pair is searched for where nobody states it.
+    """Return the default search radius for the input of a pair.
 
     Parameters
     ----------
     reference, input
         The grids of both images.
     free
-        What is searched where there is no georeferencing.
+        Search limits without georeferencing.
     """
     share_m = None if input.is_georeferenced else _free_radius_m(input, free)
     factor = coarser_m(reference, input) / reference.pixel_size_m
@@ -145,19 +145,19 @@ def _free_radius_m(grid: Grid, free: FreeSearch) -> float | None:
 
 
 def open_terrain(pair: ImagePair, dem: Any, input_dem: Any | None) -> Terrain:
-    """Return heights where a pair may show something.
+    """Return heights all over the area that a pair may show.
 
     Parameters
     ----------
     pair
         The images.
     dem, input_dem
-        The ground's heights, and those that the input was made with; None: one height.
+        The ground's heights, and those that the input was orthorectified with; None: one height.
 
     Raises
     ------
     GeoreferencingError, NoOverlapError, RasterContentError
-        They are not known where the images overlap.
+        The heights are not known where the images overlap.
     """
     corners = pair.surroundings.pixel_to_map(pair.surroundings.outline())
     left, bottom = corners.min(axis=0).tolist()

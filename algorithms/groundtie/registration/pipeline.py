@@ -1,7 +1,7 @@
 """The pipeline: inspect → mask → coarse → match → fit → check → rules → result.
 
-`run` takes images that `opening.open_pair` opened to a judged `Registration`. Every tool that
-registers is a preset of it, so what one refuses, all refuse.
+`run` turns images that `opening.open_pair` opened into a judged `Registration`. Every tool that
+registers is a preset of it, so all tools refuse by the same rules.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ def run(
     opened
         The images.
     spec
-        How.
+        How they are registered.
     context
         Threads, progress and seed.
     scene
-        What the images are, if that was found before.
+        Facts about the images, if they were found before.
     """
     context.update(0.02, "inspecting the images")
     masked = mask_pair(opened, spec, context.part(0.02, 0.12), scene)
@@ -70,7 +70,7 @@ def mask_pair(
 
 
 def begin(opened: OpenPair, masked: Masked, spec: Specification) -> Registration:
-    """Return a registration of which only the images are judged: refused by them, or by no rule."""
+    """Return a registration judged by its images alone: refused, or not judged yet."""
     scene, used = masked.scene, masked.used
     verdict = decide(ImagesEvidence(scene, used, spec.largest_error_px))
     if verdict.accepted:
@@ -83,8 +83,8 @@ def register(
 ) -> Registration:
     """Register a pair whose masks and facts are found; parameters as `run` and its stages.
 
-    What is refused as a whole, as elevated objects may cause, is tried again by the ground of a
-    radar image.
+    If the whole pair is refused, as elevated objects may cause, the ground alone that a radar image
+    shows is tried.
     """
     found = _register_once(opened, masked, spec, context)
     is_whole = masked.used.kind == NONE and not spec.is_rendered
@@ -121,7 +121,7 @@ def judge_estimate(
     Parameters
     ----------
     stages
-        Of the pair.
+        The stages of the pair.
     estimate, check
         The model, and the check points around it.
     context
@@ -143,7 +143,7 @@ def judge_estimate(
 def _asks_for_exchange(evidence: RegistrationEvidence, spec: Specification) -> bool:
     """Whether so few check points confirm a transform that those of the exchanged pair must, too.
 
-    What is rendered, or located by a sensor model, is no reference for another image.
+    An image that is rendered or located by a sensor model cannot be a reference for another one.
     """
     if not evidence.needs_second_confirmation or evidence.mask.is_ground:
         return False
@@ -154,8 +154,8 @@ def _asks_for_exchange(evidence: RegistrationEvidence, spec: Specification) -> b
 def _exchanged(stages: Stages, evidence: RegistrationEvidence, context: Context) -> Agreement:
     """Return how check points of the pair with exchanged roles agree with a transform.
 
-    They lie in the other image, and are searched for from a coarse search of their own. If that
-    search leads to other tie points than those of the transform, there are none.
+    The check points lie in the other image, around the result of a coarse search of their own.
+    There are none if the two results are farther apart than tie points are searched for.
     """
     pair = stages.masked.pair
     reference, input = pair.reference.source.grid, pair.input.source.grid
@@ -169,7 +169,7 @@ def _exchanged(stages: Stages, evidence: RegistrationEvidence, context: Context)
 
 
 def _apart_px(evidence: RegistrationEvidence, way_back: Transform) -> float:
-    """Return how far, at most, a transform and one back lead from where they began."""
+    """Return the largest distance from the start after a transform and another one back."""
     grid, transform = evidence.grid, evidence.estimate.transform
     px = grid.places()
     there = transform.input_grid.pixel_to_map(transform(grid.pixel_to_map(px)))

@@ -24,16 +24,16 @@ from ..rasters.vrt import write_vrt
 REFERENCE_GRID, UNTOUCHED = "reference", "untouched"
 OUTPUT_GRIDS = (REFERENCE_GRID, "input", UNTOUCHED)
 
-# Models that bend ever more where no point holds them.
+# Models that bend ever more where no point constrains them.
 _BENDING = ("polynomial2", "polynomial3", "tps")
 
 # Less than this share outside of the overlap is not worth a line: it would be 0 %.
 _LEAST_BEYOND = 0.005
 
-# Places a side of a raster at which its share in the overlap is found.
+# Places per side of a raster for estimating its share in the overlap.
 _PLACES = 101
 
-# Pixels keep their places when only the geotransform changes, but for this error, in pixels.
+# Largest error, in pixels, of a correction that only changes the geotransform.
 UNTOUCHED_TOLERANCE_PX = 0.05
 
 
@@ -106,7 +106,7 @@ class RegisteredOutput:
 
 @dataclass(frozen=True)
 class BeyondOverlap:
-    """What of an image, registered as a whole, lies where nothing has checked its transform.
+    """The part of an image, registered as a whole, where nothing has checked its transform.
 
     Parameters
     ----------
@@ -123,18 +123,18 @@ class BeyondOverlap:
     def of(
         cls, grid: str, transform: Transform, is_checked: Callable[[FloatArray], Mask]
     ) -> BeyondOverlap | None:
-        """Return what of a transform's raster is written beyond where it was checked.
+        """Return the part of a transform's raster that is written where nothing has checked it.
 
-        None: nothing.
+        None: there is no such part.
 
         Parameters
         ----------
         grid
-            Onto which of `OUTPUT_GRIDS` it is written.
+            The grid that the raster is written on, one of `OUTPUT_GRIDS`.
         transform
             The transform.
         is_checked
-            Returns which of some positions on the reference's map, (n, 2), lie where it was.
+            Returns which positions on the reference's map, (n, 2), lie where it was checked.
         """
         if grid == REFERENCE_GRID:
             return None
@@ -144,7 +144,7 @@ class BeyondOverlap:
 
     @property
     def bends(self) -> bool:
-        """Whether the model is not known beyond its points: one that bends."""
+        """Whether the model bends, and so is unknown beyond its points."""
         return self.model in _BENDING
 
     def summary(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class BeyondOverlap:
 def resampled_onto(
     grid: str, source: RasterSource, reference: Grid, transform: Transform
 ) -> tuple[PointFunction, Grid]:
-    """Return the grid of a registered raster, and what takes its map positions to pixels.
+    """Return the function from a registered raster's map positions to pixels, and its grid.
 
     Parameters
     ----------
@@ -183,9 +183,9 @@ def resampled_onto(
 
 
 def _registered_px(px: FloatArray, own: Grid, transform: Transform) -> FloatArray:
-    """Return where pixels of an input, shape (n, 2), belong on its own map.
+    """Return the right positions of an input's pixels, shape (n, 2), on its own map.
 
-    With longitudes near to where it has them: the borders of the whole Earth may move beyond it.
+    Longitudes stay near those of the input: borders of a global image may move beyond ±180°.
     """
     xy = reproject(transform.inverse(px), transform.crs, own.crs)
     return near_longitude(xy, own.pixel_to_map(px)[:, :1], own.crs)
@@ -217,7 +217,7 @@ def moved_grid(transform: Transform) -> Grid:
     Raises
     ------
     ParameterError
-        The shift on the reference map is none in the input's own CRS.
+        The shift on the reference map is no shift in the input's own CRS.
     """
     grid = transform.input_grid
     px = grid.outline(3)

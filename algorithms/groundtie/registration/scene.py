@@ -1,4 +1,4 @@
-"""What the images of a pair are: each fact is found once, when a step first needs it."""
+"""Facts about the images of a pair, each found once, when a step first needs it."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from .specification import BOTH, NEITHER
 
 @dataclass(frozen=True)
 class ImageFacts:
-    """What one image of a pair is.
+    """Facts about one image of a pair.
 
     Parameters
     ----------
     image
         The image.
     scene
-        The image on the matching grid, continued, with the masks that the user gave.
+        The image on the matching grid, extended as far as searches reach, with the user's masks.
     """
 
     image: Image
@@ -56,7 +56,7 @@ class ImageFacts:
 
     @cached_property
     def open_ground(self) -> OpenGround:
-        """What of it is neither forest nor settlement, as far as a radar image shows it."""
+        """The part that is neither forest nor settlement, as far as a radar image shows it."""
         return OpenGround.of(self.scene)
 
     @cached_property
@@ -66,7 +66,7 @@ class ImageFacts:
 
     @cached_property
     def has_pixel_size(self) -> bool:
-        """Whether it is known how large its pixels are on the ground.
+        """Whether the size of its pixels on the ground is known.
 
         Without a CRS, units of the map are metres by convention only.
         """
@@ -84,7 +84,7 @@ class ImageFacts:
 
     @cached_property
     def band_shifts(self) -> Sequence[BandShift]:
-        """Where bands show the ground against the first of those that show it, in matching px."""
+        """Shifts of bands against the first band that shows the ground, in matching pixels."""
         scale = self.image.source.grid.pixel_size_m / self.scene.grid.pixel_size_m
         found = band_shifts(self.image.source)
         return [replace(one, apart_px=one.apart_px * scale) for one in found]
@@ -97,14 +97,14 @@ class ImageFacts:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """What a pair of images is: radar or camera, speckled, built-up.
+    """Facts about a pair of images: radar or camera, speckled, built-up.
 
     Facts are found when they are first asked for, and never again.
 
     Parameters
     ----------
     reference, input
-        What the two images are.
+        Facts about the two images.
     declared
         Which image is declared to be a radar's: see `Specification.radar`.
     has_user_mask
@@ -126,7 +126,7 @@ class SceneInfo:
 
     @cached_property
     def radar_name(self) -> str:
-        """Which image is rather a radar's, "reference" or "input": by metadata, else by speckle."""
+        """The likelier radar image, "reference" or "input": declared, by metadata or by speckle."""
         if self.declared in (REFERENCE, INPUT):
             return self.declared
         if self.reference.is_known_radar != self.input.is_known_radar:
@@ -135,7 +135,7 @@ class SceneInfo:
 
     @property
     def radar(self) -> ImageFacts:
-        """The image that is rather a radar's."""
+        """The likelier radar image."""
         return self.reference if self.radar_name == REFERENCE else self.input
 
     @property
@@ -145,24 +145,25 @@ class SceneInfo:
 
     @property
     def sensors(self) -> Sensors:
-        """What the images are: what a tool is for; else two radars' if both are rough.
+        """The sensors: those that a tool is for; else two radars if both images are rough.
 
-        However much rougher one is, as power is than amplitudes: layover is tested for then.
+        One image may be much rougher, as power is than amplitudes: layover is tested for all the
+        same.
         """
         shown = Sensors.RADARS if self.are_both_rough else self.apparent
         return {BOTH: Sensors.RADARS, NEITHER: Sensors.CAMERAS}.get(self.declared, shown)
 
     @cached_property
     def are_both_rough(self) -> bool:
-        """Whether both images have the speckle of a radar's, or metadata that name one."""
+        """Whether both images have the speckle of a radar, or metadata that name one."""
         return all(one.is_known_radar or one.has_speckle for one in (self.reference, self.input))
 
     @cached_property
     def apparent(self) -> Sensors:
-        """What the images appear to be: by stated views, else by metadata and speckle.
+        """The sensors that the images appear to be from: by views, else by metadata and speckle.
 
-        Towns are looked for by this, whatever a tool is for: where one image alone has speckle, the
-        other may be a camera's.
+        It decides whether towns are looked for, whatever a tool is for: if only one image has
+        speckle, the other may be a camera's.
         """
         if self.declared in (REFERENCE, INPUT):
             return Sensors.DIFFERENT
@@ -186,7 +187,7 @@ class SceneInfo:
 
     @property
     def is_town(self) -> bool:
-        """Whether the radar image of a pair with a camera's shows a town."""
+        """Whether the pair is a radar and a camera image, and the radar image shows a town."""
         return self.apparent is Sensors.DIFFERENT and self.radar.strong_share >= TOWN_SHARE
 
     @property
@@ -196,19 +197,19 @@ class SceneInfo:
 
     @property
     def is_town_of_unknown_size(self) -> bool:
-        """Whether the radar image shows a town, and nobody knows how large its pixels are.
+        """Whether the radar image shows a town in pixels of unknown size.
 
-        In metres its ground is found, and is known what roofs displace. A mask of the user's needs
+        The ground is found, and the displacement by roofs is known, in metres. A user's mask needs
         neither.
         """
         return self.is_town and not self.radar.has_pixel_size and not self.has_user_mask
 
     @property
     def may_be_town(self) -> bool:
-        """Whether an image may be a radar's of a town.
+        """Whether an image may be a radar image of a town.
 
-        Without its speckle a radar image cannot be distinguished from a camera's, with fewer
-        strong scatterers; both images are checked then, unless they are declared to be a camera's.
+        Without speckle, a radar image has fewer strong scatterers and cannot be distinguished from
+        a camera's. Both images are checked then, unless they are declared to be cameras'.
         """
         if self.are_both_rough:
             return False
@@ -219,17 +220,17 @@ class SceneInfo:
 
     @property
     def is_despeckled_town(self) -> bool:
-        """Whether a radar image that metadata name shows a town, and lacks speckle.
+        """Whether an image known or declared to be a radar's may show a town, and lacks speckle.
 
-        Speckle filters leave no number of looks, and smooth roofs as they smooth the ground. A mask
-        of the user's needs no speckle.
+        Speckle filters leave no defined number of looks, and smooth roofs as they smooth the
+        ground. A user's mask needs no speckle.
         """
         is_despeckled = self.apparent is Sensors.DIFFERENT and not self.radar.has_speckle
         return is_despeckled and self.may_be_town and not self.has_user_mask
 
     @property
     def _shown(self) -> Sensors | None:
-        """What the images were found to be; None: nobody asked."""
+        """The sensors that were found; None: they were not asked for."""
         known = vars(self)
         return Sensors.RADARS if known.get("are_both_rough") else known.get("apparent")
 
@@ -275,7 +276,7 @@ def scene_of(pair: ImagePair, name: str) -> Scene:
 
 
 def located(pair: ImagePair, name: str) -> tuple[Image, PointFunction]:
-    """Return one image of a pair, and what takes map positions to its pixels, nominally."""
+    """Return one image of a pair, and the nominal function from map positions to its pixels."""
     if name == REFERENCE:
         return pair.reference, pair.reference.source.grid.map_to_pixel
     return pair.input, pair.nominal_px

@@ -1,4 +1,4 @@
-"""What a registration is asked for: one value that every stage of the pipeline reads."""
+"""The specification of a registration: one value that every stage of the pipeline reads."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ..raster_names import file_name
 from ..rasters.rendered import Light
 from ..similarity.surface import SIMILARITIES
 
-# What matches the tie points of the fit: chips alone; keypoints refined by chips around them; chips
-# all over around a model of keypoints.
+# How the tie points of the fit are matched: by chips alone; by keypoints, refined by chips around
+# them; by chips all over around a model of keypoints.
 CHIPS, KEYPOINTS, GUIDED_CHIPS = "chips", "keypoints", "guided-chips"
 MATCHERS = (CHIPS, KEYPOINTS, GUIDED_CHIPS)
 
-# Which images are declared to be a radar's; by default that is inferred from them.
+# Which images are declared to be a radar's; by default this is inferred from the images.
 BOTH, NEITHER = "both", "neither"
 
 
 @dataclass(frozen=True)
 class FreeSearch:
-    """How far images without any georeferencing are searched for.
+    """Search limits for images without any georeferencing.
 
     Parameters
     ----------
     radius_share
-        Largest shift, as a share of the input's longer side; None: as georeferenced images.
+        Largest shift, as a share of the input's longer side; None: as for georeferenced images.
     rotation_deg
         Largest rotation, either way.
     scale
@@ -52,14 +52,14 @@ ANYWHERE = FreeSearch(0.25, 180.0, 2.0)
 
 @dataclass(frozen=True)
 class StatedSurface:
-    """The elevated objects of a scene, and from where both images were taken.
+    """The elevated objects of a scene, and the views of the images.
 
     Parameters
     ----------
     model
-        A raster of heights, or a vector layer of buildings with theirs.
+        A raster of heights, or a vector layer of buildings with their heights.
     views
-        That of the reference, then that of the input if it is known.
+        The view of the reference, then that of the input if it is known.
     """
 
     model: Any
@@ -67,20 +67,20 @@ class StatedSurface:
 
     @property
     def name(self) -> str:
-        """What people call the model."""
+        """The model's name in messages."""
         is_file = isinstance(self.model, (str, Path))
         return file_name(str(self.model)) if is_file else "the surface model"
 
     @property
     def radar(self) -> str:
-        """Which image is a radar's, as `Specification.radar` has it."""
+        """Which image is a radar's, as a value of `Specification.radar`."""
         is_radar = [view.sensor == RADAR for view in self.views]
         if all(is_radar):
             return BOTH
         return (REFERENCE if is_radar[0] else INPUT) if any(is_radar) else NEITHER
 
 
-# What words may be.
+# Allowed words of fields.
 _WORDS: dict[str, tuple[str, ...]] = {
     "matcher": MATCHERS,
     "similarity": SIMILARITIES,
@@ -100,50 +100,51 @@ class Specification:
     matcher
         One of `MATCHERS`.
     similarity
-        One of `similarity.surface.SIMILARITIES`: what chips of the fit, the coarse shift and
-        check chips are compared by.
+        One of `similarity.surface.SIMILARITIES`: the measure for chips of the fit, the coarse
+        shift and check chips.
     refinement
-        By what chips refine keypoints.
+        The measure for chips that refine keypoints.
     model
         One of `models.KINDS`, or "auto" for the simplest polynomial that the points justify.
     candidates
-        What "auto" chooses from, from simple to flexible.
+        The models that "auto" chooses from, from simple to flexible.
     max_error_px
-        Largest root mean square error at check points, in pixels of the coarser image, or of the
-        size that is stated for matching.
+        Largest root mean square error at check points, in pixels of the coarser image, or of
+        `matching_pixel_size_m` if that is stated.
     search_radius_m
         How far the input may lie from its nominal place; None: 100 m or 20 pixels.
     rotation_deg, scale
-        How far it may be rotated and scaled, either way; None: not at all, or as `free` has it.
+        How far it may be rotated and scaled, either way; None: not at all, or as `free` states.
     free
-        What is searched where there is no georeferencing.
+        Search limits without georeferencing.
     radar
         Which image is a radar's, "reference", "input", "both" or "neither", for tools that are
         made for such pairs; "auto": inferred from metadata and speckle.
     surface
-        Its elevated objects; None: unknown.
+        The elevated objects of the scene; None: unknown.
     matching_pixel_size_m
         Pixel size of the matching grid; None: that of the coarser image, `enlargement` times.
     tries
-        How many registrations of this pair were tried, this one included: the probability of
-        agreement by chance is counted for all of them.
+        How many registrations of this pair were tried, this one included. The probability of
+        agreement by chance counts all of them.
     dem, input_dem
         Terrain models, as `open_raster` takes them: heights of the ground, and those that the input
         was orthorectified with (None: one height everywhere). With the first, "auto" may choose
-        `models.TERRAIN`; chips alone know it.
+        `models.TERRAIN`, which only the matcher "chips" supports.
     light
-        The reference is a terrain model: it is rendered in this light. None: it is none.
+        The reference is a terrain model and is rendered in this light; None: it is no terrain
+        model.
     surface_view
-        The reference is a surface model: it is rendered as a radar image from this view, with
-        layover, radar shadow and double bounce. None: it is none.
+        The reference is a surface model and is rendered as a radar image from this view, with
+        layover, radar shadow and double bounce; None: it is no surface model.
     is_placed
-        Whether other registrations, which all rules accepted, place both images where they are: tie
-        points are searched from there, and no survey is asked for.
+        Whether other registrations, which all rules accepted, have placed both images. Tie points
+        are then searched for from there, and no survey is made.
 
     Raises
     ------
     ParameterError
-        A value is none of its words, or no finite number from 0 on.
+        A value is none of the allowed words, or no finite number from 0 on.
     """
 
     matcher: str = CHIPS
@@ -178,12 +179,12 @@ class Specification:
 
     @property
     def is_rendered(self) -> bool:
-        """Whether the reference is no image, but heights that one is made of."""
+        """Whether the reference holds heights, from which an image is rendered."""
         return self.light is not None or self.surface_view is not None
 
     @property
     def enlargement(self) -> float:
-        """How many times as large as the coarser image's pixels matching pixels are."""
+        """Ratio of the size of matching pixels to that of the coarser image's pixels."""
         is_stated = self.matching_pixel_size_m is not None
         return 1.0 if self.light is None or is_stated else self.light.enlargement
 
@@ -193,8 +194,8 @@ class Specification:
         return self.max_error_px / self.enlargement
 
 
-# What the three tools are made for (see `tools`). Without georeferencing, SAR images may have any
-# rotation, optical ones another scale besides, and lie a quarter of their side off.
+# Presets of the three tools (see `tools`). Without georeferencing, images may lie a quarter of
+# their side off, SAR images may have any rotation, and optical images another scale besides.
 COREGISTER = Specification()
 SAR_SAR = Specification(KEYPOINTS, refinement="nmi", radar=BOTH, free=replace(ANYWHERE, scale=1.0))
 OPTICAL = Specification(GUIDED_CHIPS, radar=NEITHER, free=ANYWHERE)

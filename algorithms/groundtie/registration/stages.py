@@ -39,7 +39,7 @@ from .surface_masks import ModelFit, fit_of, fit_of_images
 
 
 class Fitter(Protocol):
-    """What finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
+    """Finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
         """Return the model that tie points agree on; `TooFewPointsError` if none do."""
@@ -54,13 +54,13 @@ class Stages:
     images
         The pair without masks.
     masked
-        What takes part.
+        The pair with all masks.
     spec
         How it is registered.
     held_out
-        What only check chips may see.
+        The blocks that only check chips may see.
     matcher
-        Matches chips of a fit to surfaces, check chips and, on reduced images, the coarse shift.
+        Matches check chips, chips of a `SurfaceFit` and, on reduced images, the coarse shift.
     fit
         Fits the model.
     """
@@ -78,7 +78,7 @@ class Stages:
         held_out = HeldOut.of(images)
         settings = SimilaritySettings(spec.similarity)
         chips = ChipMatcher(masked.pair, settings, held_out)
-        # Chips of which a mask leaves too little share a joint histogram.
+        # Chips share a joint histogram if a mask leaves too little of each.
         is_pooled = (
             spec.matcher == CHIPS
             and masked.used.leaves_little
@@ -102,7 +102,7 @@ class Stages:
         Raises
         ------
         NothingFoundError, TooFewPointsError
-            The search, or the fit, came to no transform.
+            The search, or the fit, found no transform.
         """
         context.update(0.0, "searching for the coarse shift")
         coarse = self.coarse(context.part(0.0, 0.45))
@@ -112,7 +112,7 @@ class Stages:
         return estimate, self.check(estimate.transform.model, context.part(0.9, 1.0))
 
     def coarse(self, context: Context) -> Model:
-        """Return the coarse model; that of images which are placed is none at all."""
+        """Return the coarse model; images that are placed have no coarse shift."""
         if self.spec.is_placed:
             return shift_model(0.0, 0.0)
         return find_coarse_model(self.matcher, context)
@@ -122,7 +122,7 @@ class Stages:
         return check_model(self.matcher, self.held_out.layout, model, context)
 
     def survey(self, estimate: Estimate, context: Context) -> Surveys:
-        """Match chips all over the pair, with what its masks leave, around what was estimated."""
+        """Match chips all over the masked pair around the estimate."""
         if self.spec.is_placed:
             return Surveys()
         chips = ChipMatcher(self.masked.pair, SimilaritySettings(self.spec.similarity))
@@ -137,7 +137,7 @@ class Stages:
         )
 
     def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
-        """Return what the rules look at."""
+        """Return the evidence for the rules."""
         scene = self.masked.scene
         factor = (
             KEYPOINTS_MEAN_OVER_SCATTER
@@ -180,13 +180,13 @@ def _fit(
     held_out: HeldOut,
     spec: Specification,
 ) -> Fitter:
-    """Return what fits the model, by the name of the specification's matcher."""
+    """Return the fitter for the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
         terrain = None if spec.dem is None else open_terrain(pair, spec.dem, spec.input_dem)
         candidates = spec.candidates if terrain is None else TERRAIN_CANDIDATES
         if spec.is_rendered:
-            # Polynomials bend along what no rendering shows: land cover and what is laid over.
+            # Polynomials bend along features that no rendering shows: land cover and layover.
             candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
         return SurfaceFit(matcher, layout, candidates, terrain=terrain)
     is_masked = any(image.mask is not None for image in (pair.reference, pair.input))
@@ -201,5 +201,5 @@ def _fit(
     # HOG patches ([Patel2017] 4.3) are of one size: SIFT's keypoints are too small for patches that
     # grow with them.
     keypoints = KeypointMatcher(images, SiftDetector(), HogDescriptor(), held_out, shown)
-    # Polynomials bend along elevated objects: "auto" chooses among what keypoints choose from.
+    # Polynomials bend along elevated objects: "auto" has the same candidates as with keypoints.
     return GuidedFit(keypoints, SurfaceFit(chips, layout, LINEAR_CANDIDATES))

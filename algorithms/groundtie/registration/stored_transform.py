@@ -1,4 +1,4 @@
-"""Stored transforms and tie points, for rasters that need not be those they were made with."""
+"""Stored transforms and tie points, for the rasters that they were made with or others."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .verdict import decide
 def load_stored(
     path: Path, model: str, source: RasterSource
 ) -> tuple[Transform, TiePointFit | None]:
-    """Return a stored transform, or one that is fitted to stored tie points and how it fits.
+    """Return a stored transform, or one that is fitted to stored tie points, and its fit.
 
     Parameters
     ----------
@@ -74,10 +74,10 @@ def transform_of(found: Transform, source: RasterSource, name: object) -> Transf
     Raises
     ------
     GeoreferencingError
-        The raster cannot be located: it is not georeferenced and of another size, or only one
-        has a CRS.
+        The raster cannot be located: it has another size without georeferencing, or only one of
+        raster and transform has a CRS.
     NoOverlapError
-        It lies elsewhere.
+        The raster lies elsewhere.
     """
     own, registered = source.grid, found.input_grid
     if own.crs is not None and found.crs is None:
