@@ -1,4 +1,4 @@
-"""What the parameters of a registering tool ask for."""
+"""The masks and the specification that the parameters of a registering tool ask for."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .registered_output import grid_of_output, model_for_grid
 from .specification import BOTH, Specification, StatedSurface
 from .user_masks import UserMask
 
-# What tools may leave out that do not ask for it.
+# Values of parameters that not all tools have.
 USUAL: Mapping[str, Any] = {
     "output_grid": "reference",
     "surface_model": None,
     "views": None,
 }
 
-# Where a sun or radar may stand, the likeliest first. Satellites fly nearly from pole to pole: a
-# radar looks east or west, which differ in the sign of contrast above all; so do opposite azimuths
-# of the sun. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
+# Azimuths of the sun or radar to try, the likeliest first. Satellites fly nearly from pole to pole,
+# so a radar looks east or west. The two differ mainly in the sign of contrast, as do opposite
+# azimuths of the sun. Measured with `benchmarks/run.py --only mountains`: 15° off costs little.
 _AZIMUTHS_DEG = {RADAR: (270.0, 90.0), SUN: (150.0, 120.0, 180.0, 90.0, 30.0, 60.0)}
 
-# What a view begins with that is that of heights.
+# First words of the view of a reference that holds heights.
 _TERRAIN, _SURFACE = "terrain", "surface"
 
-# What stands between the values of the reference's mask and of the other image's.
+# Separator between the values of the reference's mask and those of the other image's.
 _BETWEEN = ";"
 
 _WORDS = re.compile(rf"{_TERRAIN}[\s,]+({'|'.join(LIGHTS)})(?:[\s,]+azimuth=(\d+(?:\.\d+)?)°?)?")
@@ -50,7 +50,7 @@ def asked_masks(given: Mapping[str, Any], image: str) -> tuple[UserMask | None, 
 
 
 def _values_of_each(values: str | None, masks: Sequence[Any]) -> tuple[str | None, str | None]:
-    """Return what of each of two masks takes no part: one text is for all masks that there are."""
+    """Return the values of two masks that take no part; a single text is for each mask given."""
     if values is None:
         return None, None
     texts = [part.strip() or None for part in values.split(_BETWEEN)]
@@ -63,7 +63,7 @@ def _values_of_each(values: str | None, masks: Sequence[Any]) -> tuple[str | Non
 
 
 def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
-    """Return what a tool is told of elevated objects, by its parameters; None: nothing.
+    """Return the elevated objects that a tool's parameters state; None: none are stated.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
 
 
 def specified(preset: Specification, parameters: Mapping[str, Any]) -> Specification:
-    """Return a preset with what a tool was called with."""
+    """Return a preset with the parameters that a tool was called with."""
     return replace(
         searched(preset, {**USUAL, **parameters}, "input"),
         **asked_terrain(parameters),
@@ -117,7 +117,7 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        They do not go together.
+        The parameters do not go together.
     """
     dem, input_dem = given.get("dem"), given.get("input_dem")
     if input_dem is not None and dem is None:
@@ -129,14 +129,14 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of a specification the view of a reference states that is heights; {}: none.
+    """Return the fields of a specification that render a reference of heights; {}: an image.
 
-    It is that of a single try, where a radar stands in the west by default.
+    They are for a single try, with the radar in the west by default.
 
     Raises
     ------
     ParameterError
-        The words state none, or not where the sun or the radar stands.
+        The words state no view, or not the position of the sun or the radar.
     """
     view = asked_surface_view(given)
     if view is not None:
@@ -151,13 +151,13 @@ def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def asked_surface_view(given: Mapping[str, Any]) -> View | None:
-    """Return from where a reference that is a surface model is to be rendered; None: it is none.
+    """Return the view to render a surface model from; None: the reference is no surface model.
 
     Parameters
     ----------
     given
         The values of a tool's parameters. The reference's view is `surface radar azimuth=280
-        incidence=35`, or without numbers, which the input's metadata then must state.
+        incidence=35`, or without the numbers, if the input's metadata state them.
 
     Raises
     ------
@@ -177,13 +177,13 @@ def asked_surface_view(given: Mapping[str, Any]) -> View | None:
 
 
 def asked_lights(given: Mapping[str, Any]) -> tuple[Light, ...]:
-    """Return in which lights a reference that is a terrain model may be rendered.
+    """Return the lights in which a terrain model may be rendered; (): the reference is none.
 
     Parameters
     ----------
     given
         The values of a tool's parameters. The reference's view is `terrain sun azimuth=155`, or
-        without azimuth, which is then to be tried; else the reference is an image.
+        without azimuth, and then several are tried.
 
     Raises
     ------

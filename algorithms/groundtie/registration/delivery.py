@@ -1,4 +1,4 @@
-"""What a registering tool leaves: the registered image and its files, or a refusal's report."""
+"""The output of a registering tool: the registered image and its files, or a refusal's report."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RegistrationFiles:
     displacement: Path | None = None
 
     def named(self) -> dict[str, Path]:
-        """Return what `write` writes of an accepted registration, by name."""
+        """Return the files that `write` writes for an accepted registration, by name."""
         named = {
             "output": None if self.output is None else self.output.path,
             "tie_points": self.tie_points,
@@ -47,19 +47,19 @@ class RegistrationFiles:
         return {name: path for name, path in named.items() if path is not None}
 
     def beyond(self, registration: Registration) -> BeyondOverlap | None:
-        """Return what of the written image lies outside of the overlap; None: nothing, or none."""
+        """Return the part of the written image outside of the overlap; None: no part, or image."""
         output = self.output
         if output is None or not registration.verdict.accepted:
             return None
         return registration.beyond_overlap(grid_of_output(output.path, output.grid))
 
     def write(self, registration: Registration, context: Context) -> None:
-        """Write all files, or those of a refused registration: the report."""
+        """Write all files, or for a refused registration the report alone."""
         with Outputs() as outputs:
             grid = None
             if registration.verdict.accepted:
                 grid = self._write_results(registration, outputs, context)
-            # Last: who finds it finds all that it is about.
+            # Last: once the report exists, so do all files that it describes.
             if self.report is not None:
                 item = self._item(registration, grid, self.report)
                 registration.page().write(outputs, self.report, item)
@@ -81,7 +81,7 @@ class RegistrationFiles:
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
     ) -> Grid | None:
-        """Write what an accepted registration leaves, and return the registered raster's grid."""
+        """Write an accepted registration's results, and return the registered raster's grid."""
         transform, points = registration.accepted(), registration.tie_points
         evidence = registration.evidence
         assert points is not None and evidence is not None
@@ -101,18 +101,18 @@ class RegistrationFiles:
 
 @dataclass(frozen=True)
 class Call:
-    """How a registering tool was called, apart from its images: the same for all of them.
+    """How a registering tool was called, apart from its specification: the same for all tools.
 
     Parameters
     ----------
     reference, input
-        What `open_raster` takes.
+        Rasters as `open_raster` takes them.
     files
-        What is to be written.
+        The files to write.
     bands, masks
         See `opening.open_pair`.
     parameters
-        All of its parameters, for the report.
+        All parameters of the tool, for the report.
     workers
         Number of threads; None: one per processor.
     progress
@@ -173,7 +173,7 @@ class Call:
         return open_pair(self.reference, self.input, spec, context, self.bands, self.masks)
 
     def with_limits(self, opened: OpenPair, spec: Specification, context: Context) -> OpenPair:
-        """Return an open pair as far as another specification searches."""
+        """Return an open pair with the search limits of another specification."""
         images = opened.images
         return pair_images(
             images.reference,
@@ -188,7 +188,7 @@ class Call:
     def deliver(
         self, registration: Registration, context: Context, stack: ExitStack
     ) -> Registration:
-        """Write what the registration leaves; `stack` keeps its rasters open as long as it lives.
+        """Write the registration's files; `stack` keeps its rasters open as long as it lives.
 
         Raises
         ------
@@ -214,7 +214,7 @@ def register_as(
     Parameters
     ----------
     preset
-        What the tool is made for.
+        The specification that the tool starts from.
     parameters
         The values of its parameters by name: those of `tools.coregister`.
     progress

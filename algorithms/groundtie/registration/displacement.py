@@ -21,7 +21,7 @@ _SIGMA = "sigma: standard deviation of dx and of dy"
 
 
 def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid]:
-    """Return by how much an input is moved to its right place, and how well that is known.
+    """Return the displacement of an input to its right place, with its standard deviation.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Ground control from a reference image: the pipeline between an oriented image and the map.
 
 The image is projected onto the map by its RPCs, piece by piece as it is read, and registered there
-as any other pair; what is found is carried back into the image.
+as any other pair. The points that are found are carried back into the image.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from .specification import Specification
 from .stages import Stages
 from .verdict import judge_search
 
-# A coarse shift that points would not agree with is put into the RPCs before they are matched: by
-# wrong RPCs the image is projected with the heights of other places. After that so much is left to
-# search for, in matching pixels.
+# Search radius, in matching pixels, after a coarse shift was put into the RPCs. A shift above the
+# tolerance of points is put there before they are matched: wrong RPCs project the image with the
+# heights of other places.
 _LEFT_PX = 20.0
 
 
@@ -52,7 +52,7 @@ class GroundControl:
     points
         The points, those of the fit first; None if there are none.
     common
-        What displaces them all alike, in pixels of the image.
+        Displacement of all points alike, in pixels of the image.
     """
 
     registration: Registration
@@ -94,7 +94,7 @@ def match_ground_control(
     bands, masks
         Those of the reference and of the image; see `opening.open_pair`.
     stack
-        Keeps what is open as long as the result is used.
+        Keeps rasters open as long as the result is used.
     context
         Threads, progress and seed.
     """
@@ -145,7 +145,7 @@ def match_ground_control(
 
 
 def _shift_in_image(pair: ImagePair, orientation: Orientation, model: Model) -> FloatArray:
-    """Return by how much image positions differ from those of the RPCs, by a model on the map."""
+    """Return the shift of image positions against those of the RPCs, by a model on the map."""
     xy = pair.grid.pixel_to_map(pair.grid.places())
     shifts = orientation.to_px(model(xy)) - orientation.to_px(xy)
     return np.asarray(np.nanmedian(shifts, axis=0))

@@ -34,7 +34,7 @@ def write_orthoimage(
     grid
         The grid of the result; None: one that covers the image, in the orientation's CRS.
     pixel_size
-        Of that grid, in metres; None: that of the image on level ground.
+        Pixel size of that grid, in metres; None: that of the image on level ground.
     resampling
         One of `warping.METHODS`.
 
@@ -45,9 +45,9 @@ def write_orthoimage(
     """
     source, by = image.source, image.orientation
     if grid is None:
-        # Where another georeferencing than the RPCs places the image does not count.
+        # Georeferencing other than the RPCs is ignored.
         pixels = source.grid.on_own_pixels()
-        # A wall or a steep slope must not decide how large pixels are.
+        # A wall or a steep slope must not determine the pixel size.
         smooth = by.to_level_map
         grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size, smooth)
     else:

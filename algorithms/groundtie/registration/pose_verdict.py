@@ -36,14 +36,14 @@ from .verdict import Verdict, judge
 
 @dataclass(frozen=True)
 class PoseEvidence:
-    """What is known of a pose.
+    """Evidence for a pose from the candidates of a search.
 
     Parameters
     ----------
     found
         The poses that a search found, best first.
     exhaustive
-        Those of an exhaustive search over all rotations, best first.
+        The poses of an exhaustive search over all rotations, best first.
     shape
         Rows and columns of the reference.
     """
@@ -63,9 +63,9 @@ class PoseEvidence:
         exhaustive: bool,
         context: Context,
     ) -> PoseEvidence:
-        """Put the candidates of a search beside those of an exhaustive one over all rotations.
+        """Compare the candidates of a search with those of an exhaustive one over all rotations.
 
-        Rotations and shifts beyond the limits measure how high chance is, and may hold a better
+        Rotations and shifts beyond the limits measure the height of chance, and may hold a better
         pose: where the scene repeats, one within small limits is as good as the right one.
 
         Parameters
@@ -73,7 +73,7 @@ class PoseEvidence:
         windows
             Reference and input.
         limits
-            Those of the search.
+            The limits of the search.
         found
             What the search found, best first.
         exhaustive
@@ -99,7 +99,7 @@ class PoseEvidence:
 
     @property
     def rival_ratio(self) -> float | None:
-        """Its height over that of the best one elsewhere; None if there is none."""
+        """Ratio of `height` to the height of the best pose elsewhere; None if there is none."""
         if len(self.exhaustive) < 2:
             return None
         return self.exhaustive[0].height / self.exhaustive[1].height
@@ -116,12 +116,12 @@ class PoseEvidence:
 
 @dataclass(frozen=True)
 class PoseSurveyEvidence(ImagesEvidence):
-    """What chips all over a pair show of a pose that a search found.
+    """Evidence for a pose from chips all over a pair.
 
     Parameters
     ----------
     found
-        What they show.
+        The survey of these chips.
     layover_factor
         See `RegistrationEvidence`.
     is_shift
@@ -134,7 +134,7 @@ class PoseSurveyEvidence(ImagesEvidence):
 
     stages: ClassVar = (BANDS, AGREEMENT, ERROR, SURVEY)
     judged: ClassVar = "it, and no other pose matches nearly as well"
-    # The pose is what a search found; chips all over are none that it was fitted to.
+    # The pose comes from a search: it was not fitted to the chips.
     fit_points: ClassVar = 0
     fit_points_used: ClassVar = 0
 
@@ -150,7 +150,7 @@ class PoseSurveyEvidence(ImagesEvidence):
 
     @cached_property
     def held_out(self) -> Agreement:
-        """How each chip agrees with the pose as the others have it."""
+        """How each chip agrees with the pose that the other chips give."""
         return Agreement.of(
             "chips all over",
             self._error,
@@ -183,14 +183,14 @@ class PoseSurveyEvidence(ImagesEvidence):
 def confirm_pose(
     images: tuple[Image, Image], windows: PoseWindows, pose: Pose, context: Context
 ) -> tuple[Verdict, Pose]:
-    """Return the verdict on a pose that the search believes, and where chips all over move it.
+    """Return the verdict on a pose that a search found, and, if accepted, the pose by all chips.
 
     Parameters
     ----------
     images
         Reference and input.
     windows
-        What the pose was found in.
+        The windows that the pose was found in.
     pose
         The pose.
     context
@@ -208,5 +208,5 @@ def confirm_pose(
     mask = MaskUsed.none("a pose is searched for without a mask")
     evidence = PoseSurveyEvidence(scene, mask, POSE_TOLERANCE_PX, found, factor, is_shift)
     verdict = judge(evidence)
-    # What the chips confirm is where they have moved it.
+    # The chips confirm the pose to which they moved it.
     return verdict, moved if verdict.accepted else pose

@@ -36,7 +36,7 @@ CHECK_POINTS, LEFT_OUT = "check points", "points left out in turn"
 
 @dataclass(frozen=True)
 class RefinementEvidence:
-    """What is known of refined RPCs.
+    """Evidence for refined RPCs.
 
     Parameters
     ----------
@@ -45,19 +45,19 @@ class RefinementEvidence:
     adjustment
         The bias that was estimated from them.
     check
-        Points that took no part; None: there are none. Of too few, each point of the fit is judged
+        Held-out points; None: there are none. If they are too few, each point of the fit is judged
         by a fit without it and its neighbours.
     metres_per_px
         Side of an image pixel on the ground.
     max_error_px
         Largest root mean square error at held-out points.
     folding_px
-        By how much RPCs with the bias folded in miss it.
+        Largest error of RPCs that the bias is folded into.
     needs_spread
-        Whether control at one place does not tell the bias elsewhere; who measured points and asks
-        for a shift states that it does.
+        Whether control at one place does not determine the bias elsewhere. A user who gives points
+        and asks for a shift states that it does.
     common
-        What displaces all points alike, in pixels of the image, as far as it is known.
+        Displacement of all points alike, in pixels of the image, as far as it is known.
     """
 
     control: Control
@@ -84,7 +84,7 @@ class RefinementEvidence:
 
     @property
     def extent(self) -> float:
-        """Share of the sides of the image that control spreads over, the smaller one."""
+        """Share of a side of the image that control spreads over; of both sides, the smaller."""
         return float((np.ptp(self._used_px, axis=0) / np.array(self.control.size)).min())
 
     @property
@@ -94,7 +94,7 @@ class RefinementEvidence:
 
     @cached_property
     def held_out(self) -> Agreement:
-        """How points that took no part agree with the refined RPCs."""
+        """How held-out points agree with the refined RPCs."""
         name, _, after = self.held
         nodes_px = Grid(PIXEL_COORDINATES, None, *self.control.size).places()
         return Agreement.of(
@@ -130,7 +130,7 @@ class RefinementEvidence:
 
     @cached_property
     def held(self) -> tuple[str, Control, FloatArray]:
-        """What took no part, in words, as points, and by how much the bias misses it, (n, 2)."""
+        """The name of the held-out points, the points, and their residuals by the bias, (n, 2)."""
         if self.check is None or len(self.check) < FEWEST_CHECK_POINTS:
             return LEFT_OUT, self.control, self.adjustment.left_out_px
         return CHECK_POINTS, self.check, self.check.residuals_px(self.adjustment.bias)
@@ -160,19 +160,19 @@ class RefinedRpc:
     points
         The ground control; blunders are rejected.
     fit
-        The RPCs, with the bias folded in, and how far they miss it.
+        The RPCs with the bias folded in, and the largest error of that.
     evidence
-        What the verdict rests on: the points as the delivered RPCs see them, and the bias.
+        The basis of the verdict: the points as the delivered RPCs see them, and the bias.
     verdict
         Whether the refined RPCs can be trusted.
     heights
-        What contradicts the heights.
+        The check of the heights' vertical datum.
     mask
         Which mask points were matched with; None: they were given.
     files
-        What was written, by name.
+        The files that were written, by name.
     tried
-        Why RPCs were refined, where the images decided it, a line each.
+        Why RPCs were refined, if the images decided that, a line each.
     """
 
     path: str
@@ -214,7 +214,7 @@ class RefinedRpc:
         Raises
         ------
         NotRegisteredError
-            There are too few.
+            There are too few points.
         """
         fitted, checked = points.fit, points.check
         rpc = image.orientation.rpc
@@ -253,9 +253,9 @@ class RefinedRpc:
         return self.evidence.adjustment
 
     def residuals(self) -> PointErrors:
-        """Return by how much the refined RPCs miss the points, in the image.
+        """Return the residuals of the points by the refined RPCs, in the image.
 
-        Without enough check points, those are shown for them that points have when left out.
+        Without enough check points, the residuals of points left out in turn take their place.
         """
         control, adjustment = self.evidence.control, self.adjustment
         fitted = control.residuals_px(adjustment.bias)
@@ -310,9 +310,9 @@ class RefinedRpc:
 
 
 def _median_above(points: ControlPoints, heights: Heights) -> float | None:
-    """Return how far points that have heights of their own lie above a terrain model.
+    """Return the median height above a terrain model of points that have heights of their own.
 
-    None: there is none, or they have no heights.
+    None: there is no terrain model, or no point has a height.
     """
     if isinstance(heights, ConstantHeight):
         return None

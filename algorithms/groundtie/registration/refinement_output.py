@@ -29,7 +29,7 @@ from .ground_control import GroundControl
 from .refinement import RefinedRpc
 from .sensor_input import OrientedImage
 
-# Writes what refined RPCs make of an image.
+# Writes the output of a refinement: refined RPCs, or an image that is made with them.
 WriteOutput = Callable[[OrientedImage, RPCFit, Path, Progress], None]
 
 
@@ -51,16 +51,16 @@ def write_rpcs(image: OrientedImage, fit: RPCFit, path: Path, progress: Progress
 
 @dataclass(frozen=True)
 class RefinementFiles:
-    """The files that are asked for; None: not.
+    """The files that are asked for; None: not asked for.
 
     Parameters
     ----------
     parameters
-        What the tool was called with, for the report.
+        The parameters that the tool was called with, for the report.
     write_output
         Writes the output.
     started
-        When, by `time.perf_counter`.
+        When the work began, by `time.perf_counter`.
     """
 
     output: Path
@@ -71,7 +71,7 @@ class RefinementFiles:
     started: float = field(default_factory=time.perf_counter)
 
     def written(self) -> dict[str, str]:
-        """Return what is written, by name."""
+        """Return the files that are written, by name."""
         return given_files(
             {"output": self.output, "residuals": self.residuals, "report": self.report}
         )
@@ -100,7 +100,7 @@ class RefinementFiles:
         Parameters
         ----------
         refined
-            What was estimated.
+            The refined RPCs.
         image
             The image, with the RPCs as delivered.
         found
@@ -120,7 +120,7 @@ class RefinementFiles:
                     by_refined = replace(image.orientation, rpc=refined.fit.rpc)
                     staged = outputs.stage(self.residuals)
                     refined.points.write(staged, by_refined, image.source.grid)
-            # Last: who finds it finds all that it is about.
+            # Last: once the report exists, so do all files that it describes.
             if self.report is not None:
                 self._page(refined, image, found).write(outputs, self.report)
         refined.require_accepted()
@@ -138,7 +138,7 @@ class RefinementFiles:
 
 
 def require_place(source: RasterSource, output: Path | None, *more: Path | None) -> None:
-    """Refuse outputs that are files of the image, and RPCs that GDAL would not take from there.
+    """Refuse outputs that are files of the image, and RPCs where GDAL would not read them.
 
     Parameters
     ----------
@@ -165,14 +165,14 @@ def require_place(source: RasterSource, output: Path | None, *more: Path | None)
     is_copy = output.suffix.lower() in GEOTIFF
     raster = output if is_copy else Path(source.path)
     is_beside = not is_copy and is_rpc_file_of(output, raster)
-    # Other drivers prefer what the raster itself or its .aux.xml states to some or all files.
+    # Other drivers prefer RPCs of the raster itself or its .aux.xml to some or all RPC files.
     if is_beside and source.driver() != "GTiff":
         raise OutputError(
             f"GDAL may not take RPCs from {output.name}, as {raster} is no GeoTIFF: give the "
             "output another name, to be named as its RPC file (--rpc), or write a copy (.tif)"
         )
     found = rpc_files(raster, None if is_copy else output)
-    # Those that lie beside a new raster of that name alone are removed.
+    # RPC files beside a copy are removed if it is the only raster of its name.
     is_kept = is_copy and not is_only_raster_of_its_name(output)
     if found and (is_kept or (is_beside and found[0].name != output.name)):
         raise OutputError(

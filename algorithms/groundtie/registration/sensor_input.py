@@ -1,4 +1,4 @@
-"""What tools for images with RPCs share: where heights come from, and the image oriented."""
+"""Shared input of tools for images with RPCs: the source of heights, and the oriented image."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from ..sensor.orientation import Orientation, orient, seen_at
 from ..sensor.rpc import RPC, VALID_RANGE
 from ..sensor.rpc_files import rpc_of
 
-# Filled voids of less of an image are not stated: rims are known to reduced pixels.
+# Filled voids below this share of an image are not stated: rims are only known in reduced pixels.
 _LEAST_FILLED = 0.005
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Where heights come from, as a user gives it.
+    """The source of heights, as a user gives it.
 
     Parameters
     ----------
     dem, datum, geoid
-        A terrain model, and what it counts from: a datum's name or a geoid's grid.
+        A terrain model, and the zero of its heights: a datum's name or a geoid's grid.
     height_m
         The height without a terrain model; None: the RPCs' own.
     least_cover
@@ -58,7 +58,7 @@ class Ground:
             )
 
     def _note(self, orientation: Orientation) -> str:
-        """Return in words which heights are used, and of which share of the image they are."""
+        """Return in words which heights are used, and the share of the image that they cover."""
         if self.dem is not None:
             share, filled = orientation.known_share, orientation.filled_share
             partly = "" if share == 1 else f", which covers {_percent(share)} of the image"
@@ -124,7 +124,7 @@ class Ground:
 
 
 def _percent(share: float) -> str:
-    # What is not all must not read as all, nor as nothing.
+    # A share of less than all must read neither as all nor as nothing.
     return f"{min(max(round(100 * share), 1), 99) if share < 1 else 100} %"
 
 

@@ -27,7 +27,7 @@ from .verdict import Verdict, both_units
 
 @dataclass(frozen=True)
 class GcpResult:
-    """What `extract_gcps` found.
+    """The result of `extract_gcps`.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def refine(
 ) -> RefinedRpc:
     """Refine RPCs as the tool `refine_rpc` does, from its parameters by name.
 
-    Other files than those of the parameters may be written.
+    `files`, if given, are written instead of those of the parameters.
 
     Raises
     ------

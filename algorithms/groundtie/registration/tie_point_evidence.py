@@ -1,4 +1,4 @@
-"""What speaks for tie points that a transform is fitted to: how they lie, and how they agree."""
+"""Evidence for tie points that a transform is fitted to: their distribution and agreement."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class TiePointFit:
     border_spread_px
         By how much the border of the raster moves, at most, if points err by 1 px.
     log10_chance
-        log10 of the expected number of models that random points would fit as well; None: the
-        points are no more than the model needs, and fit any.
+        log10 of the expected number of models that random points would fit as well; None: there are
+        no more points than the model needs, so that any would fit.
     edited
         Number of points that a person moved or drew, by their lines or the column of that name.
     """
@@ -121,7 +121,7 @@ class TiePointEvidence:
 
     @property
     def judged_by(self) -> str:
-        """The model that shows how the points agree: a spline bends to any, its affine part not."""
+        """The model that agreement is judged by: a spline fits any points, its affine part not."""
         return "affine" if self.kind == "tps" else self.kind
 
     @property
@@ -153,7 +153,7 @@ class TiePointEvidence:
 
     @cached_property
     def transform(self) -> Transform:
-        """The transform that the model is, fitted by least squares."""
+        """The transform, fitted by least squares."""
         return self._fitted(self.kind)
 
     def residuals_px(self, transform: Transform) -> FloatArray:
@@ -163,7 +163,7 @@ class TiePointEvidence:
 
     @cached_property
     def log10_chance(self) -> float | None:
-        """log10 of the expected number of models that random points fit as well; None: any.
+        """log10 of the expected number of models that random points fit as well; None: any fit.
 
         Points agree within whatever radius is the least likely ([Moisan2004]).
         """
