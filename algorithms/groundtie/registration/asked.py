@@ -129,7 +129,7 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def asked_rendering(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a specification that render a reference of heights; {}: an image.
+    """Return a specification's fields that render a reference of heights; {}: it is an image.
 
     They are for a single try, with the radar in the west by default.
 

@@ -109,7 +109,7 @@ def register_anything(
     Raises
     ------
     NotRegisteredError
-        Every way that makes sense was refused.
+        Every way that was tried was refused.
     """
     if _needs_rpcs(parameters["input"]):
         return _by_rpcs(parameters, progress)

@@ -47,7 +47,7 @@ class RegistrationFiles:
         return {name: path for name, path in named.items() if path is not None}
 
     def beyond(self, registration: Registration) -> BeyondOverlap | None:
-        """Return the part of the written image outside of the overlap; None: no part, or image."""
+        """Return the written image's part outside of the overlap; None: no such part, or image."""
         output = self.output
         if output is None or not registration.verdict.accepted:
             return None

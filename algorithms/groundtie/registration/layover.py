@@ -34,7 +34,7 @@ def mean_of_heights_px(
     """Return the mean displacement of all matches by heights, from chips' scatter, shape (2,).
 
     All may be displaced by as much to either side where a mask leaves more ground than elevated
-    objects. Callers double it where the ground may be the lowest of what matched.
+    objects. Callers double it where the ground may be the lowest of the matched surfaces.
     """
     if survey is None or len(survey.centres) == 0:
         return np.zeros(2)

@@ -1,6 +1,6 @@
-"""Masks of the ground, of a town or of the country, that is found in a radar image.
+"""Masks of the ground that a radar image shows, in towns and in the country.
 
-As masks of the user do, they become a raster that masks one image of the pair (see `user_masks`).
+Like the user's masks, they become a raster that masks one image of the pair (see `user_masks`).
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ OUTPUT_GRIDS = (REFERENCE_GRID, "input", UNTOUCHED)
 # Models that bend ever more where no point constrains them.
 _BENDING = ("polynomial2", "polynomial3", "tps")
 
-# Less than this share outside of the overlap is not worth a line: it would be 0 %.
+# A smaller share outside of the overlap is not reported: it would read as 0 %.
 _LEAST_BEYOND = 0.005
 
 # Places per side of a raster for estimating its share in the overlap.
@@ -202,7 +202,7 @@ def model_for_grid(model: str, output_grid: str) -> str:
     Raises
     ------
     ParameterError
-        They do not go together.
+        Model and grid do not go together.
     """
     if output_grid != UNTOUCHED:
         return model

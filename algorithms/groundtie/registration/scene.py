@@ -126,7 +126,10 @@ class SceneInfo:
 
     @cached_property
     def radar_name(self) -> str:
-        """The likelier radar image, "reference" or "input": declared, by metadata or by speckle."""
+        """The likelier radar image, "reference" or "input".
+
+        It is found by declaration, else by metadata, else by speckle.
+        """
         if self.declared in (REFERENCE, INPUT):
             return self.declared
         if self.reference.is_known_radar != self.input.is_known_radar:
@@ -160,9 +163,9 @@ class SceneInfo:
 
     @cached_property
     def apparent(self) -> Sensors:
-        """The sensors that the images appear to be from: by views, else by metadata and speckle.
+        """The apparent sensors: by stated views, else by metadata and speckle.
 
-        It decides whether towns are looked for, whatever a tool is for: if only one image has
+        They decide whether towns are looked for, whatever a tool is for: if only one image has
         speckle, the other may be a camera's.
         """
         if self.declared in (REFERENCE, INPUT):

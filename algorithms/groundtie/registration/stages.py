@@ -195,11 +195,11 @@ def _fit(
     # Detectors and descriptors were chosen among many by `detector_repeatability` and `make bench`
     # (see `studies`).
     if spec.matcher == KEYPOINTS:
-        # Of radar images: upright SIFT-OCT ([Suri2010] 6.3).
+        # For radar images: upright SIFT-OCT ([Suri2010] 6.3).
         keypoints = KeypointMatcher(images, SiftOctDetector(), SiftDescriptor(), held_out, shown)
         return KeypointFit(keypoints, SurfaceFit(matcher, layout), chips)
-    # HOG patches ([Patel2017] 4.3) are of one size: SIFT's keypoints are too small for patches that
-    # grow with them.
+    # HOG patches ([Patel2017] 4.3) have one size: if they grew with SIFT's keypoints, they would be
+    # too small.
     keypoints = KeypointMatcher(images, SiftDetector(), HogDescriptor(), held_out, shown)
     # Polynomials bend along elevated objects: "auto" has the same candidates as with keypoints.
     return GuidedFit(keypoints, SurfaceFit(chips, layout, LINEAR_CANDIDATES))

@@ -239,7 +239,7 @@ def draw_mask(source: RasterSource, mask: UserMask, stack: ExitStack, progress: 
     source
         The image.
     mask
-        Its mask, one of those that `UserMask.is_drawn`.
+        Its mask, for which `UserMask.is_drawn` must hold.
     stack
         Keeps the drawn mask until it is closed.
     progress

@@ -24,7 +24,7 @@ class Rule:
     source
         Where the limit comes from.
     advice
-        What a user can do that is safe.
+        A safe next step for the user.
     reason
         Returns why it refuses, in a sentence; None: it does not.
     is_final
