@@ -132,8 +132,8 @@ def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> N
 def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float) -> str:
     """Return the simplest kind of model that the matches justify.
 
-    Its score is minus the squared distance from a model fitted without the match, limited to that
-    of an outlier.
+    A match scores minus its squared distance from a model fitted without it, limited to that of
+    an outlier.
     """
 
     def fit(kind: str) -> tuple[str, FloatArray]:

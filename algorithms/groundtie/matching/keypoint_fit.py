@@ -1,7 +1,7 @@
 """Fits that start from keypoints near their positions predicted by a coarse model.
 
-Mutual information on reduced images has found the coarse model ([Suri2010] 6.9). Keypoints are
-matched without a limit on the ratio, but only near their predicted positions. Most matches are
+Mutual information on reduced images has found the coarse model. Keypoints are matched without a
+limit on the ratio, but only near their predicted positions ([Suri2010] 6.9). Most matches are
 outliers anywhere in the gate; a robust fit finds the inliers, which chips may refine.
 """
 

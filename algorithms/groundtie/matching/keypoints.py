@@ -1,4 +1,4 @@
-"""Keypoints matched all over a pair, tile by tile, near their positions by a coarse model."""
+"""Keypoints matched all over a pair, tile by tile, near positions predicted by a coarse model."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LARGEST_SCORE = 10.0
 
 @dataclass(frozen=True)
 class KeypointMatcher:
-    """Matches keypoints of a pair on its matching grid, near their positions by a coarse model.
+    """Matches keypoints on a pair's matching grid, near positions predicted by a coarse model.
 
     Parameters
     ----------

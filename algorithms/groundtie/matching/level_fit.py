@@ -21,7 +21,7 @@ from .frames import compose
 from .matcher import Places
 from .pooled import PooledHistogramMatcher
 
-# Number of chips along a side at every level of the pyramid, and their side in pixels of the level.
+# Most chips along a side at every level of the pyramid, and their side in pixels of the level.
 _CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
 

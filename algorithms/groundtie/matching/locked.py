@@ -1,8 +1,8 @@
 """Pixel-locked content: structure that is identical in both arrays, wherever the ground lies.
 
 Labels, frames, watermarks, clouds of one deck, tiles of one mosaic and the pattern of one sensor
-are fixed to columns and rows, or to the map, where another grid has other columns and rows. Two
-images that share such drawn content match where it coincides, whatever ground they show.
+are fixed to columns and rows, or to map positions, which have other columns and rows in another
+grid. Two images that share such drawn content match where it coincides, whatever ground they show.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class LockedContent:
     pair
         The images.
     to_input
-        Takes map positions to the input pixels that hold the same drawn content: those of the
-        transform, or those at its shift of the array, rounded to whole columns and rows.
+        Takes map positions to the input pixels that hold the same drawn content, by the transform
+        or by its shift of the array rounded to whole columns and rows.
     shared
         The content that they share.
     """
@@ -172,10 +172,7 @@ def find_locked_content(
 
 
 def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFunction, float]:
-    """Return the shift by whole columns and rows nearest to a transform, and its largest error.
-
-    The error is in pixels.
-    """
+    """Return the whole-pixel shift nearest to a transform, and its largest deviation in pixels."""
     grid, reference = pair.grid, pair.reference.source.grid
     xy = grid.pixel_to_map(grid.places())
     found, there = transform(xy), reference.map_to_pixel(xy)

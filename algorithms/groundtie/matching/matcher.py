@@ -148,7 +148,7 @@ class ChipSurfaces:
         return self._sums(np.array(middles, int).reshape(-1, 2), members)
 
     def with_neighbours(self, spacing_px: float) -> ChipSurfaces:
-        """Return the weighted sum of each chip and its neighbours at the given spacing."""
+        """Return the weighted sum of each chip and its neighbours, given the chips' spacing."""
         from scipy.spatial import cKDTree  # takes long to import; few scenes need it
 
         if len(self.centres) == 0:

@@ -136,7 +136,7 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
 
 
 def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
-    """Return for each shift the size of the set of highest chips with most excess, and this."""
+    """Return for each shift the size and excess of the set of highest chips with most excess."""
     confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
     excess = confirming / np.sqrt(np.arange(1, len(higher)))[:, None]
     excess = excess[_FEWEST_CHIPS - 2 :]

@@ -34,8 +34,8 @@ _HOPELESS = 0.0
 # Search radius of chips around a candidate, in pixels of the level.
 _RADIUS_PX = 12
 
-# Error of a level's model, in pixels of that level, and the distortion that it leaves unmodelled,
-# in pixels of the level that is searched.
+# Largest error of a level's model, in pixels of that level, and the distortion that it leaves
+# unmodelled, in pixels of the level that is searched.
 _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 
 # Largest ratio of pixel sizes between successive levels.

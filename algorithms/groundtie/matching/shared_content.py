@@ -44,15 +44,15 @@ class SharedContent:
     def is_exact(self) -> bool:
         """Whether the content lies too exactly on whole pixels for ground.
 
-        Radar images that vary alike as views of the same ground do, where speckle has averaged
-        out, do not count as exact.
+        Radar images of the same ground vary alike where speckle has averaged out, so images that
+        do so never count as exact.
         """
         is_ground = self.sensors is Sensors.RADARS and self.sameness.varies_as_ground
         return self.is_whole and not is_ground
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is identical than in two views of the same ground, or is so too exactly.
+        """Whether more is identical than in two views of the same ground, or `is_exact`.
 
         Two radar images of the same ground vary alike where speckle has averaged out, as in pixels
         of many looks.
@@ -76,7 +76,7 @@ class SharedContent:
 
     @property
     def may_be_drawn(self) -> bool:
-        """Whether only identical content may match, even if it covers no more than of ground."""
+        """Whether identical content may be all that matches, even if no more than ground shows."""
         return self.sameness.covers_some and not self.is_explained
 
     @property

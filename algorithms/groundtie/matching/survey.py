@@ -76,7 +76,7 @@ class Survey:
 
     @property
     def comparable(self) -> int:
-        """Number of chips that overlap the input at the prediction; others have surfaces of 0."""
+        """Number of chips that overlap the input where predicted; others have surfaces of 0."""
         near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
         return int((near != 0).any(axis=1).sum())
 

@@ -18,8 +18,8 @@ from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
 # In images that are not of two radars or one camera, windows that vary alike and edges that
-# coincide are a small part of what matches. Without the ones or the others, correct transforms
-# leave 1.1 and more (suite real), drawn content over different ground mostly up to 0.8.
+# coincide are a small part of what matches. Without one or the other, correct transforms leave 1.1
+# and more (suite real), drawn content over different ground mostly up to 0.8.
 LEAST_OF_REST = 1.0
 
 
