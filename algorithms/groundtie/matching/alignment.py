@@ -1,8 +1,8 @@
 """Fitting a model directly to the similarity surfaces of all chips.
 
-Picking a peak for each chip discards the information of weak surfaces, and what displaces single
-chips, as layover does, displaces their peaks. Summed along a model, surfaces agree on the ground:
-the model with the largest sum of similarities is sought.
+Picking a peak for each chip discards the information of weak surfaces, and keeps the displacement
+of single chips, by layover for example. Summed along a model, surfaces agree on the ground, so the
+fit seeks the model with the largest sum of similarities.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from ..rasters.kernels import bspline_weights
 from .belief_propagation import Surfaces
 from .families import Family, coefficients_of
 
-# Surfaces are blurred by these, one after the other, so that the fit is caught from afar.
+# Standard deviations of the blur in successive fits: blurred surfaces attract a fit from afar.
 _BLURS_PX = (1.5, 0.0)
 
-# The fit has arrived when the sum of similarities rises by less than this per pixel.
+# The fit has converged when the sum of similarities rises by less than this per pixel.
 _SLOPE_PER_PX = 0.01
 _STEPS = 60
 
-# Where a chip is shown depends on the heights there: they are asked for again so often.
+# Heights depend on where the model places a chip, and are updated this many times.
 _HEIGHT_PASSES = 3
 
-# From simple to flexible, those that "auto" chooses from; see `align`.
+# Candidates of "auto", from simple to flexible; see `align`.
 MODEL_CANDIDATES = ("translation", "similarity", "affine", "polynomial2", "polynomial3")
 LINEAR_CANDIDATES = MODEL_CANDIDATES[:3]
 TERRAIN_CANDIDATES = (*LINEAR_CANDIDATES, TERRAIN, *MODEL_CANDIDATES[3:])
 
 
-# The four weights of a cubic B-spline, and their derivatives, are polynomials of the way between
-# two pixels; these are their coefficients, from the constant on, shape (2, 4, 4).
+# The four weights of a cubic B-spline, and their derivatives, are polynomials of the fractional
+# pixel position. These are their coefficients, constant term first, shape (2, 4, 4).
 _WEIGHTS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
 _SPLINE = np.stack([_WEIGHTS, np.diag([1.0, 2.0, 3.0], k=1) @ _WEIGHTS])
 _POWERS, _TAPS = np.arange(4), np.arange(-1, 3)
@@ -57,14 +57,14 @@ _POWERS, _TAPS = np.arange(4), np.arange(-1, 3)
 
 @dataclass(frozen=True)
 class Prior:
-    """What the input was resampled by for matching.
+    """The model by which the input was resampled for matching.
 
     Parameters
     ----------
     to_nominal
-        From grid pixels to nominal grid pixels, shapes (n, 2).
+        Takes grid pixels to nominal grid pixels, shapes (n, 2).
     linear
-        Nominal pixels for each pixel, shape (2, 2): what is common to all places.
+        The linear part common to all places, nominal pixels per pixel, shape (2, 2).
     """
 
     to_nominal: PointFunction
@@ -72,26 +72,25 @@ class Prior:
 
     @cached_property
     def to_shift(self) -> FloatArray:
-        """Takes distances in nominal pixels to those in pixels, shape (2, 2)."""
+        """The matrix that takes offsets in nominal pixels to offsets in pixels, shape (2, 2)."""
         return np.asarray(np.linalg.inv(self.linear), np.float64)
 
     @classmethod
     def of_affine(cls, affine: Affine) -> Prior:
-        """Return the prior that an affine transform is."""
+        """Return the prior of an affine transform."""
         linear = np.array([[affine.a, affine.b], [affine.d, affine.e]])
         return cls(lambda px: apply_affine(affine, px), linear)
 
 
-# The input as it is.
+# The prior of an input at its nominal place.
 IDENTITY = Prior.of_affine(Affine.identity())
 
 
 @dataclass(frozen=True)
 class _Field(Rows):
-    """Surfaces that can be looked up anywhere: B-spline coefficients of blurred surfaces.
+    """Surfaces that can be interpolated anywhere: B-spline coefficients of blurred surfaces.
 
-    `px` are the chips' centres, (n, 2), `predicted` where the input was taken to have them, by
-    `prior`.
+    `px` are the chips' centres, (n, 2); `predicted` are their nominal positions by `prior`.
     """
 
     px: FloatArray
@@ -100,7 +99,7 @@ class _Field(Rows):
     prior: Prior
 
     def scores(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return similarity, (n,), at nominal positions, and its gradient to these, (n, 2)."""
+        """Return similarity, (n,), at nominal positions, and its gradient there, (n, 2)."""
         linear, side = self.prior.to_shift, self.coefficients.shape[1]
         shift = (nominal - self.predicted) @ linear.T
         # Beyond the window a surface is zero, and so is its gradient.
@@ -132,17 +131,17 @@ def align(
     Parameters
     ----------
     kinds
-        Of `models.DEGREE`, or `models.TERRAIN`, from simple to flexible: one, or what is chosen
-        from.
+        Kinds of model to choose from, of `models.DEGREE` or `models.TERRAIN`, from simple to
+        flexible.
     px
         The chips' centres in the matching grid, shape (n, 2).
     surfaces
-        Their similarity, without that of their neighbours, by the weight of each, about 1 at its
-        peak; shape (n, 2 r + 1, 2 r + 1).
+        The chips' own similarity times their weights, about 1 at the peak, without messages from
+        neighbours; shape (n, 2 r + 1, 2 r + 1).
     prior
-        What the input was resampled by for matching.
+        The model by which the input was resampled for matching.
     start
-        What to start from: takes grid pixels, (n, 2), to nominal grid pixels.
+        The initial model: takes grid pixels, (n, 2), to nominal grid pixels.
     terrain
         Heights at the grid's pixels, for the model that needs them.
     """
@@ -182,7 +181,7 @@ def _align(
 
 
 def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:
-    """Return the surfaces to look up, from the most to the least blurred."""
+    """Return the interpolated surfaces, from the most to the least blurred."""
     fields, centres = [], px.astype(float)
     predicted = prior.to_nominal(centres)
     for blur in _BLURS_PX:
@@ -193,7 +192,7 @@ def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Fie
 
 
 def _spline_coefficients(values: FloatArray) -> FloatArray:
-    """Return the coefficients of cubic B-splines through values, (n, s, s), mirrored beyond."""
+    """Return the coefficients of cubic B-splines through values, (n, s, s), mirrored at borders."""
     middle, side = bspline_weights(4, 0.0)[1], bspline_weights(4, 0.0)[0]
     size = values.shape[1]
     splines = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
@@ -208,7 +207,7 @@ def _maximise(family: Family, field: _Field, start: FloatArray) -> FloatArray:
     design, scale = family.design, family.frame.to_map.a
 
     def cost(parameters: FloatArray) -> tuple[float, FloatArray]:
-        # Parameters count in pixels here, so that steps and gradients are of one size.
+        # Parameters are scaled to pixels here, so that steps and gradients are of similar size.
         coefficients, jacobian = coefficients_of(family.kind, parameters / scale)
         nominal = field.px + scale * (design @ coefficients)
         value, slope = field.scores(nominal)

@@ -1,8 +1,8 @@
-"""Bands of one image that show the ground at other pixels than others do.
+"""Bands of one image that are displaced against each other.
 
-Parallax between the detectors of a push-broom sensor, or careless stacking, displaces bands. They
-are averaged before they are matched, and registered by one transform. Source: phase correlation
-[Kuglin1975], of the strength of edges, which bands share whatever their contrast.
+Parallax between the detectors of a push-broom sensor, or careless stacking, displaces bands, but
+bands are averaged before matching, and registered by one transform. Source: phase correlation
+[Kuglin1975] of edge strength, which bands share whatever their contrast.
 """
 
 from __future__ import annotations
@@ -23,33 +23,34 @@ from ..similarity.phases import Spectra, phase_surface, phases, spectra
 from ..similarity.surface import Surface, normalise
 from .matcher import Places
 
-# Windows all over the image: at most so large, and so many along a side.
+# Windows all over the image: largest side, and most along a side of the image.
 _WINDOW_PX, _MOST_ALONG = 192, 3
 
 # Smaller windows hold too few edges.
 _LEAST_PX = 32
 
-# Edges of two bands have one shift if they correlate by so many robust standard deviations there;
-# one that moves them, if so many times more than they correlate, or do the opposite, unmoved.
-# Measured on the shared images as they are (32, three missions' among them): up to 2.4 times and
-# by up to 7, of a cirrus band, which shows no ground; of the others 1.0 times. Of heights beside
-# their shading: 1.2 times and by 16. Of bands displaced by 6 px and more: from 4.2 times and by 28.
+# The first is the least correlation of two bands' edges at their shift, in robust standard
+# deviations. At a shift beyond tolerance it must also be so many times (the second) the magnitude
+# of the unshifted correlation. Measured on the unchanged shared images (32, three missions' among
+# them): up to 2.4 times and up to 7 for a cirrus band, which shows no ground; 1.0 times for the
+# others. Heights beside their shading: 1.2 times and 16. Bands displaced by 6 px and more: from 4.2
+# times and 28.
 _LEAST_HEIGHT, _CLEAR = 14.0, 3.0
 
-# So far, unmoved edges correlate.
+# Shifts up to this count as unshifted.
 _UNMOVED_PX = 1
 
 
 @dataclass(frozen=True)
 class BandShift:
-    """Where a band shows the ground, against the first of those that show the same.
+    """Displacement of a band against the first band that shows the same ground.
 
     Parameters
     ----------
     bands
-        Numbers of both, from 1.
+        Numbers of the first band and of this one, from 1.
     apart_px
-        How far elsewhere, in pixels.
+        Length of the displacement, in pixels.
     """
 
     bands: tuple[int, int]
@@ -58,7 +59,7 @@ class BandShift:
 
 @dataclass(frozen=True)
 class _Band:
-    """A band: its spectra, and where it shows the ground against the band `first`."""
+    """A band: its spectra, and its displacement against the band `first`."""
 
     spectra: Spectra
     first: int
@@ -66,10 +67,11 @@ class _Band:
 
 
 def band_shifts(source: RasterSource) -> Sequence[BandShift]:
-    """Return where the bands of an image, but alpha, show the ground that a band before shows.
+    """Return the displacements of an image's bands, except alpha, against earlier bands.
 
-    By whole images: windows all over it are compared, and their correlations added up. A band
-    that has no edges in common with the last one that had, or with the one before it, is left out.
+    Each is one shift for the whole image: correlations of windows all over it are added up. A band
+    is compared with the last band that matched and the band before it; one that shares edges with
+    neither is left out.
     """
     bands = source.image_bands
     side = min(_WINDOW_PX, *source.grid.size)
@@ -105,7 +107,7 @@ def _spectra(source: RasterSource, windows: Sequence[Window], band: int) -> Spec
 
 
 def _shift_px(one: Spectra, other: Spectra, side: int) -> NDArray[np.float64] | None:
-    """Return how far bands are apart, (x, y), by spectra of windows of a side; None: unclear."""
+    """Return the shift (x, y) between bands from spectra of windows of a side; None: unclear."""
     surface = normalise(phase_surface(phases(one, other).sum(axis=0), side))
     peak = find_peak(surface)
     least = _LEAST_HEIGHT
@@ -115,9 +117,9 @@ def _shift_px(one: Spectra, other: Spectra, side: int) -> NDArray[np.float64] | 
 
 
 def _height_unmoved(surface: Surface) -> float:
-    """Return the largest magnitude where bands count as unmoved.
+    """Return the largest magnitude of the correlation of unshifted bands.
 
-    It is negative where edges lie beside one another, as those of heights and of their shading.
+    The correlation is negative where edges lie beside one another, as with heights and shading.
     """
     middle = surface.shape[0] // 2
     near = slice(middle - _UNMOVED_PX, middle + _UNMOVED_PX + 1)

@@ -1,10 +1,10 @@
 """Belief propagation between the similarity surfaces of neighbouring chips.
 
 Neighbouring places are misregistered by nearly the same shift. Chips are the nodes of a graph,
-their shifts its unknowns, and loopy belief propagation (sum-product) passes messages between
-them: what a chip's own surface and its other neighbours make likely, blurred by how much shifts
-may differ. A surface without a clear peak passes messages on, so that they reach across places
-without evidence.
+and their shifts are its unknowns. Loopy belief propagation (sum-product) passes messages between
+them. A message holds the shifts that a chip's own surface and its other neighbours make likely,
+blurred by the expected difference of shifts. A surface without a clear peak passes messages on, so
+that they reach across places without evidence.
 
 Source: [Pearl1988], [Murphy1999].
 """
@@ -25,10 +25,10 @@ _DIFFERENCE_PX = 2.0
 _NO_EVIDENCE = 0.7
 _UNRELATED = 0.1
 
-# How often messages are passed: each travels that many chips far.
+# Number of passes, and of chips across which a message travels.
 _PASSES = 8
 
-# So many pairs' messages are made at a time: they fit into the processor's cache.
+# Number of pairs whose messages are computed at a time, to fit into the processor's cache.
 _BLOCK = 128
 
 
@@ -45,18 +45,18 @@ def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) ->
         The chips' centres, shape (n, 2).
     reach_px
         Distance up to which chips are neighbours. Their shifts should not differ by more than
-        about 4 px along each axis: compensate what is known of the misregistration first.
+        about 4 px along each axis: compensate the known misregistration first.
 
     Returns
     -------
-    Array of the shape of `surfaces`, float32: the logarithm of how likely each shift is by the
+    Array of the shape of `surfaces`, float32: the logarithm of the likelihood of each shift by the
     chip and its neighbours together, up to a constant. Chips without neighbours keep their own
     surface.
     """
     if len(surfaces) == 0:
         return surfaces
     count, span = surfaces.shape[:2]
-    # Chip by chip: a matrix of all distances grows with the square of their number.
+    # Chip by chip, as a matrix of all distances grows with the square of the number of chips.
     later = [
         k + 1 + np.flatnonzero(np.hypot(*(centres[k + 1 :] - centres[k]).T) <= reach_px)
         for k in range(count)
@@ -71,10 +71,10 @@ def propagate(surfaces: Surfaces, centres: NDArray[np.int_], reach_px: float) ->
 
 
 def _log_evidence(surfaces: Surfaces) -> Surfaces:
-    """Return the log likelihood ratio of each shift being true to there being no evidence.
+    """Return the log likelihood ratio of each shift being true to the surface having no evidence.
 
-    For a surface of unit variance, shifts are as likely as the exponential of its values; the
-    share of chips without evidence keeps the evidence against a shift bounded.
+    For a surface of unit variance, the likelihood of a shift is proportional to the exponential of
+    its value. The share of chips without evidence keeps the evidence against a shift bounded.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _messages(prior: Surfaces, pairs: _Pairs, span: int) -> Surfaces:
         for start in range(0, len(pairs), _BLOCK):
             block = slice(start, start + _BLOCK)
             first, second = pairs[block].T
-            # A chip's message leaves out what it received from the very neighbour.
+            # A message excludes what the sender received from the recipient.
             sent = np.stack(
                 [belief[first] - received[1, block], belief[second] - received[0, block]]
             )
@@ -127,7 +127,7 @@ def _blurred(sent: Surfaces, kernel: Surfaces) -> Surfaces:
     Parameters
     ----------
     sent
-        Logarithms of how likely each shift of the sender is, shape (2, m, span²).
+        Log likelihoods of the sender's shifts, shape (2, m, span²).
     kernel
         See `_difference_kernel`.
     """
@@ -149,6 +149,6 @@ def _difference_kernel(span: int) -> Surfaces:
 
 
 def _incidence(nodes: _Pairs, count: int) -> csr_matrix:
-    """Return the matrix that sums up rows of messages by the node they are for."""
+    """Return the matrix that sums rows of messages by their recipient."""
     edges = np.arange(len(nodes))
     return csr_matrix((np.ones(len(nodes), np.float32), (nodes, edges)), shape=(count, len(nodes)))

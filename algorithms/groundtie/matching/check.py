@@ -12,13 +12,13 @@ from .layout import ChipLayout
 from .matcher import Places
 from .surface_fit import SurfaceMatcher, check_points
 
-# Largest shift of a check chip from where the model predicts it.
+# Largest shift of a check chip from its position predicted by the model.
 CHECK_RADIUS_PX = 12
 
 
 @dataclass(frozen=True)
 class Check:
-    """What check chips show.
+    """The matches of check chips.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ class Check:
 def check_model(
     matcher: SurfaceMatcher, layout: ChipLayout, model: Model, context: Context
 ) -> Check:
-    """Match the check chips around what a model on the map predicts.
+    """Match the check chips around their positions predicted by a model on the map.
 
     Parameters
     ----------
     matcher
-        What the chips are matched by.
+        Matches the chips.
     layout
-        Where they lie, inside the held-out blocks.
+        Layout of the check chips, inside the held-out blocks.
     model
         The model that is checked.
     context

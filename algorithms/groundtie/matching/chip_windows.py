@@ -1,6 +1,6 @@
 """The windows of chips in both images, resampled for a block of neighbouring chips at a time.
 
-Windows of neighbours overlap: resampled chip by chip, most pixels would be made several times.
+Windows of neighbours overlap: chip by chip, most pixels would be resampled several times.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .matcher import MaskOf, Places
 
 R = TypeVar("R")
 
-# Returns what of the input is looked at, given the reference and the input.
+# Takes the reference and the input, and returns the part of the input that is compared.
 LeftOf = Callable[[Patch, Patch], Patch]
 
 _Numbers = NDArray[np.intp]
@@ -31,30 +31,31 @@ _Numbers = NDArray[np.intp]
 # The upper left corner of a piece of a grid, and both images there.
 _Piece = tuple[NDArray[np.int_], tuple[Patch, Patch]]
 
-# Longest side of a block that is read from files, in pixels: enough of them for all threads, and
-# each in the processor's cache.
+# Longest side of a block that is read from files, in pixels: small enough that all threads get
+# blocks, and that each block fits into the processor's cache.
 _BLOCK_PX = 384
 
-# Images of so many pixels are resampled as a whole: 5 bytes each are held for either.
+# Images of up to this many pixels are resampled as a whole: each takes 5 bytes per pixel.
 _HELD_PIXELS = 4_000_000
 
-# Windows are worked in stacks of about so many pixels. Larger ones leave the processor's cache; of
-# smaller ones, threads wait more often for one another: `benchmarks/run.py --only kernels`.
+# Windows are processed in stacks of about this many pixels. Larger ones exceed the processor's
+# cache; with smaller ones threads wait more often for one another: `benchmarks/run.py --only
+# kernels`.
 _STACK_PIXELS = 131_072
 
 
 @dataclass(frozen=True)
 class Resampled:
-    """Two images, the input where a model has it: what windows of chips are cut out of.
+    """The images from which windows of chips are cut, the input resampled by a model.
 
     Parameters
     ----------
     pair
         The images.
     to_input
-        Takes map positions, shape (n, 2), to the pixels of the input that are shown there.
+        Takes map positions, shape (n, 2), to pixels of the input.
     is_held
-        Whether both lie in memory on the grid of the chips.
+        Whether both images are held in memory, resampled on the grid of the chips.
     """
 
     pair: ImagePair
@@ -72,7 +73,7 @@ class Resampled:
     def of(
         cls, pair: ImagePair, to_input: PointFunction, grid: Grid, reach_px: int, context: Context
     ) -> Resampled:
-        """Resample images as a whole if they are small; of large ones chips show a part alone.
+        """Resample small images as a whole; large ones are resampled around chips, when read.
 
         Parameters
         ----------
@@ -81,7 +82,7 @@ class Resampled:
         grid
             The grid on which chips are matched.
         reach_px
-            How far windows of chips reach beyond it.
+            Margin by which windows of chips reach beyond the grid.
         context
             Threads.
         """
@@ -98,14 +99,14 @@ class Resampled:
         return cls(held, around.map_to_pixel, is_held=True)
 
     def read(self, piece: Grid, hidden: MaskOf | None = None) -> tuple[Patch, Patch]:
-        """Return both images on a piece of the grid, the reference without what is hidden."""
+        """Return both images on a piece of the grid, with hidden reference pixels masked."""
         reference = self.pair.reference_patch(piece, None if hidden is None else hidden(piece))
         return reference, self.pair.input_patch(piece, self.to_input)
 
 
 @dataclass(frozen=True)
 class ChipWindows:
-    """Windows of chips, and of so many pixels around them, of both images of a pair.
+    """Windows of chips with a margin around them, in both images of a pair.
 
     Parameters
     ----------
@@ -114,12 +115,11 @@ class ChipWindows:
     places
         The chips.
     reach_px
-        Pixels around a chip on each side.
+        Margin around a chip on each side, in pixels.
     hidden
-        Returns for a piece of a grid which pixels of the reference must not be seen; None: all
-        may be.
+        Takes a piece of a grid and returns which pixels of the reference are hidden; None: none.
     left_of
-        What of the input is looked at; None: all is.
+        Returns the part of the input that is compared; None: all of it is.
     """
 
     images: Resampled
@@ -134,11 +134,12 @@ class ChipWindows:
         context: Context,
         is_kept: Callable[[Patch, Patch], bool] | None = None,
     ) -> tuple[list[int], list[R]]:
-        """Return what `function` makes of chips' windows, and the numbers of these chips, in order.
+        """Apply a function to the windows of chips; return the chips' numbers and the results.
 
-        It takes a stack of reference windows, shape (n, h, w), and that of their input windows, and
-        returns what it makes of each. `is_kept` takes a chip in both images, without what is around
-        it, and returns whether its windows are looked at; None: all are.
+        Both are ordered by number. `function` takes a stack of reference windows, shape (n, h, w),
+        and the stack of their input windows, and returns one result for each pair. `is_kept` takes
+        a chip in both images, without its margin, and returns whether to process it; None: all
+        are processed.
         """
         chips = np.arange(len(self.places.centres))
         held = self._read(chips) if self.images.is_held and len(chips) else None
@@ -172,13 +173,13 @@ class ChipWindows:
 
     @property
     def _most(self) -> int:
-        """How many chips a stack has."""
+        """Most chips in a stack."""
         return max(_STACK_PIXELS // self._side_px**2, 1)
 
     def _blocks(self, chips: _Numbers) -> Iterator[_Numbers]:
-        """Yield chips, by number, in blocks that are read as one.
+        """Yield the numbers of chips in blocks that are read at once.
 
-        In files, that reads fewer pixels; from memory, a block is a stack.
+        From files, fewer pixels are read that way; from memory, a block is a stack.
         """
         if self.images.is_held:
             yield from (chips[k : k + self._most] for k in range(0, len(chips), self._most))
@@ -194,7 +195,7 @@ class ChipWindows:
             return
         along = corners[:, int(np.argmax(size))]
         first = along < (along.min() + along.max() + 1) / 2
-        # Chips at one place cannot be parted.
+        # Chips at the same position cannot be divided by position.
         if first.all():
             yield from (chips[k : k + 1] for k in range(len(chips)))
             return
@@ -202,7 +203,7 @@ class ChipWindows:
         yield from self._blocks(chips[~first])
 
     def _read(self, block: _Numbers) -> _Piece:
-        """Return both images where the windows of a block's chips lie."""
+        """Return both images over the area of the windows of a block's chips."""
         side, corners = self._side_px, self._corners[block]
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
@@ -220,7 +221,7 @@ class ChipWindows:
 
 
 def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], Iterable[R]]:
-    """Return the function of stacks of windows that a function of single windows makes."""
+    """Return a function of stacks of windows that applies a function to each pair of windows."""
 
     def of_stacks(reference: Patch, input: Patch) -> Iterable[R]:
         return map(function, reference.images, input.images)
@@ -229,6 +230,6 @@ def singly(function: Callable[[Patch, Patch], R]) -> Callable[[Patch, Patch], It
 
 
 def _parts(patch: Patch, parts: list[tuple[slice, slice]]) -> Patch:
-    """Return the stack of a patch's parts."""
+    """Return parts of a patch as a stack."""
     values, valid = ([of[part] for part in parts] for of in (patch.values, patch.valid))
     return Patch(np.stack(values), np.stack(valid))

@@ -1,4 +1,4 @@
-"""Chips that are matched each by its own similarity surface, both ways."""
+"""Chips that are each matched by their own similarity surface, in both directions."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from .matcher import ChipSurfaces, MaskOf, Places
 
 _log = logging.getLogger(__name__)
 
-# Chips with less valid area than this in either image are not matched. A mask leaves what was
-# chosen to be matched: a little of it may be enough.
+# Chips with a smaller valid share than this in either image are not matched. The second limit is
+# for masked images: a mask leaves what was chosen for matching, so a little may be enough.
 _LEAST_VALID, LEAST_VALID_MASKED = 0.4, 0.1
 
-# The background alone reaches about this many robust standard deviations.
+# A surface without a true peak reaches about this many robust standard deviations.
 _LEAST_HEIGHT = 3.0
 
-# If a tenth of the chips is expected to be shifted by more than this, they are matched again.
+# If a tenth of the chips are expected to be shifted by more than this, all are matched again.
 _FAR_PX = 2.5
 
 
@@ -51,13 +51,12 @@ class ChipMatcher:
     pair
         The images.
     settings
-        How similarity is measured.
+        The similarity measure.
     held_out
-        Returns for a piece of a grid which pixels of the reference must not be seen; None: all
-        may be.
+        Takes a piece of a grid and returns which pixels of the reference are hidden; None: none.
     least_valid
-        Chips with less valid area than this share in either image are not matched; None: as images
-        with or without a mask.
+        Chips with a smaller valid share than this in either image are not matched; None: the
+        default of images with or without a mask.
     """
 
     pair: ImagePair
@@ -66,11 +65,11 @@ class ChipMatcher:
     least_valid: float | None = None
 
     def seeing_all(self) -> ChipMatcher:
-        """Return this matcher for check chips, which may see what is held out of the fit."""
+        """Return this matcher for check chips, which may see the blocks held out of the fit."""
         return replace(self, held_out=None)
 
     def match(self, model: Model, places: Places, radius_px: int, context: Context) -> ChipSurfaces:
-        """Return the surfaces, both ways, of all chips that have enough valid pixels.
+        """Return the surfaces, in both directions, of all chips that have enough valid pixels.
 
         Parameters
         ----------
@@ -79,7 +78,7 @@ class ChipMatcher:
         places
             The chips.
         radius_px
-            Largest shift from where the model predicts a chip.
+            Largest shift of a chip from its position predicted by the model.
         context
             Threads and progress.
         """
@@ -96,15 +95,15 @@ class ChipMatcher:
         context: Context,
         images: Resampled | None = None,
     ) -> tuple[NDArray[np.int_], Surfaces]:
-        """Return the centres that could be matched and their surfaces, one way, at half the cost.
+        """Return the centres that could be matched and their forward surfaces, at half the cost.
 
-        Parameters as `match`; `images` are the pair's, resampled by this model before.
+        Parameters as `match`; `images` are the pair's, already resampled by this model.
         """
         kept, found = self._run(model, places, radius_px, context, 1, images)
         return kept, found[:, 0]
 
     def fit_places(self, layout: ChipLayout) -> Places:
-        """Return the chips that a fit is made of."""
+        """Return the chips of the fit."""
         return Places(self.pair.grid, layout.fit_centres, layout.chip_px)
 
     def first_model(
@@ -117,22 +116,22 @@ class ChipMatcher:
         return find_consensus(px, px + peak_shifts(supported), CONSENSUS_PX, kind, seed)
 
     def kind_of(self, kind: str) -> str:
-        """Return the kind of model that is fitted where one is asked for."""
+        """Return the kind of model to fit when `kind` is requested."""
         return kind
 
     def is_settled(self, expected_px: FloatArray) -> bool:
-        """Whether expected shifts, shape (n, 2), are so small that matching again is in vain.
+        """Whether expected shifts, shape (n, 2), are too small for matching again to help.
 
-        Chips near the border of their search windows have seen too little.
+        Matches near the border of their search windows rest on too little of the surface.
         """
         return not np.quantile(np.hypot(*expected_px.T), 0.9) > _FAR_PX
 
     def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces:
-        """Return the surfaces that points of the fit are taken from: each chip's own."""
+        """Return the surfaces from which tie points of the fit are taken: each chip's own."""
         return surfaces
 
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
-        """Return the surfaces that check points are taken from: each chip's own."""
+        """Return the surfaces from which check points are taken: each chip's own."""
         return surfaces
 
     def _run(
@@ -146,8 +145,8 @@ class ChipMatcher:
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1).
 
-        The first way is that of chips of the reference in the input. The second is back, rotated by
-        180° so that it peaks at the same place.
+        The first way matches chips of the reference in the input. The second matches chips of the
+        input in the reference, rotated by 180° so that it peaks at the same place.
         """
         reach = radius_px + BORDER_PX
         seen = images or Resampled.by_model(self.pair, model, places.grid, reach, context)
@@ -190,8 +189,8 @@ class ChipMatcher:
 
 
 def _equal_weight(surfaces: Surfaces) -> FloatArray:
-    """Return by what surfaces are multiplied so that every chip counts the same in a fit.
+    """Return the weights by which every chip counts the same in a fit.
 
-    The highest peaks are those of buildings, which are displaced by layover.
+    Unweighted, buildings would dominate: they have the highest peaks, but are displaced by layover.
     """
     return 1 / np.maximum(surfaces.max(axis=(1, 2), initial=0.0), _LEAST_HEIGHT).astype(float)

@@ -23,7 +23,7 @@ from ..similarity.surface import SimilaritySettings, describe, similarity_surfac
 from .frames import compose
 from .matcher import MaskOf
 
-# The longer side of the reduced image, in pixels, and how many candidates are kept.
+# The longer side of the reduced image, in pixels, and the number of candidates kept.
 LEVEL_SIDE_PX = 512
 MOST_CANDIDATES = 4
 
@@ -33,20 +33,20 @@ _LOW = 0.4
 # Candidates nearer than this are the same, in pixels of the level.
 _SAME_PLACE = np.ones((2 * 4 + 1,) * 2, bool)
 
-# Few bins keep the count over a large search window quick, and are enough for whole scenes.
+# Few bins keep counting over a large search window fast, and are enough for whole scenes.
 _BINS = 8
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model of degree 1 on the map by which the images may match, and its peak's height."""
+    """A model of degree 1 on the map that may align the images, and the height of its peak."""
 
     model: Model
     height: float
 
 
 def level_factor(grid: Grid) -> float:
-    """Return how much coarser than the matching grid the level of the coarse search is."""
+    """Return how many times coarser than the matching grid the coarse search's level is."""
     return max(max(grid.size) / LEVEL_SIDE_PX, 1.0)
 
 
@@ -66,17 +66,16 @@ def coarse_candidates(
     level
         The matching grid at reduced resolution.
     settings
-        How similarity is measured.
+        The similarity measure.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
-        may be.
+        Takes a piece of the grid and returns which pixels of the reference are hidden; None: none.
     context
         Threads.
 
     Raises
     ------
     RasterContentError
-        One of the images is constant or has no valid pixel where they overlap, maybe by its mask.
+        One of the images is constant or has no valid pixel in the overlap, perhaps due to its mask.
     """
     if settings.bins is None:
         settings = replace(settings, bins=_BINS)
@@ -103,9 +102,10 @@ def _shift_on_map(place: Peak, level: Grid) -> Model:
 
 
 def _elsewhere(pose: Candidate, places: list[Peak], level: Grid) -> list[Candidate]:
-    """Return candidates with the rotation and scale of a pose, as high as other shifts are by it.
+    """Return candidates with the rotation and scale of a pose at other shifts.
 
-    Of each rotation and scale the search of poses keeps one shift: what repeats has more.
+    The pose search keeps one shift for each rotation and scale, but repetitive scenes match at
+    several. The pose's height is scaled by the similarity at each shift relative to its own.
     """
     near_px = _SAME_PLACE.shape[0] // 2
 
@@ -133,14 +133,14 @@ def _places(
     context: Context,
     model: Model,
 ) -> list[Peak]:
-    """Search all shifts from a model on, and return the highest peaks of their similarity."""
-    # The true place may lie a pixel of the level further than whole pixels show.
+    """Search all shifts relative to a model, and return the highest peaks of their similarity."""
+    # The true shift may lie a pixel of the level beyond the nearest whole pixel.
     radius_px = int(np.ceil(pair.limits.radius / min(level.pixel_sides_m))) + 1
-    # Farther off too little of the images overlaps.
+    # At larger shifts the images overlap too little.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
     reach = radius_px + BORDER_PX
     reference, input = _patches(pair, level, model, reach, held_out, context)
-    # What a mask leaves of the input is all that can lie under the reference.
+    # Only the unmasked share of the input can overlap with the reference.
     valid = 1.0 if pair.input.mask is None else input.valid_share
     surface = similarity_surface(
         describe(reference, level.width * level.height, settings, context.memo),
@@ -169,7 +169,7 @@ def _patches(
     held_out: MaskOf | None,
     context: Context,
 ) -> tuple[Patch, Patch]:
-    """Return the reference with a border around the level, and the input with a wider one."""
+    """Return the reference with a margin around the level, and the input with a wider one."""
     template, search = (
         level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
         for more in (BORDER_PX, reach)
@@ -192,7 +192,7 @@ def _patches(
 
 
 def _on_map(transform: Transform, level: Grid) -> Model:
-    """Return a transform of degree 1 as a model from map positions to nominal ones."""
+    """Return a transform of degree 1 as a model from map positions to nominal map positions."""
     xy = level.pixel_to_map(level.outline(4))
     nominal = near_longitude(transform.nominal_xy(transform(xy)), xy[:, :1], transform.crs)
     return fit_model("affine", xy, nominal)

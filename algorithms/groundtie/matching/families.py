@@ -1,4 +1,4 @@
-"""The models of a kind at some chips: what parameters, which a fit climbs along, make of them."""
+"""The models of one kind at given chips, as functions of the parameters that a fit optimises."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..rasters.grid import FloatArray, PointFunction
 
 @dataclass(frozen=True)
 class Family(Rows):
-    """The models of a kind at some chips, a row each: what their parameters make of positions.
+    """The models of one kind at given chips, one row per chip.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ class Family(Rows):
     terrain
         Heights at the grid's pixels; None: the kind needs none.
     rise
-        How high the chips lie over what was assumed, in units of `scale_m` from `origin_m`,
-        shape (n, 1); of shape (n, 0) for kinds that need no heights.
+        Heights of the chips above the assumed heights, in units of `scale_m` from `origin_m`,
+        shape (n, 1); shape (n, 0) for kinds that need no heights.
     """
 
     kind: str
@@ -42,7 +42,7 @@ class Family(Rows):
 
     @classmethod
     def of(cls, kind: str, px: FloatArray, start: PointFunction, terrain: Terrain | None) -> Family:
-        """Return the family of a kind; `start` states where the input has the chips."""
+        """Return the family of a kind; `start` takes the chips to nominal positions."""
         plain = cls(kind, Frame.around(px), px, None, np.zeros((len(px), 0)))
         if kind != TERRAIN:
             return plain
@@ -56,12 +56,12 @@ class Family(Rows):
 
     @cached_property
     def design(self) -> FloatArray:
-        """What coefficients, (terms, 2), are multiplied by, shape (n, terms)."""
+        """Design matrix, by which coefficients, (terms, 2), are multiplied, shape (n, terms)."""
         terms = monomials(self.frame.enter(self.px), DEGREE.get(self.kind, 1))
         return np.hstack([terms, self.rise])
 
     def model(self, parameters: FloatArray) -> Model:
-        """Return the model that has some parameters."""
+        """Return the model with the given parameters."""
         coefficients = coefficients_of(self.kind, parameters)[0]
         if self.terrain is None:
             return PolynomialModel(self.kind, self.frame, coefficients)
@@ -69,7 +69,7 @@ class Family(Rows):
         return TerrainModel(self.kind, self.frame, scaled, self.terrain, self.origin_m)
 
     def starting(self, start: PointFunction) -> FloatArray:
-        """Return the parameters of the model that is nearest to another one."""
+        """Return the parameters of the model of this family nearest to another model."""
         kind, px = self.kind, self.px
         target = (start(px) - px) / self.frame.to_map.a
         coefficients = np.linalg.lstsq(self.design, target, rcond=None)[0]
@@ -83,13 +83,13 @@ class Family(Rows):
         return np.array([*shift, growth, turn])
 
     def raised(self, parameters: FloatArray) -> Family:
-        """Return the family with the heights where a model has the chips."""
+        """Return the family with the heights at which a model places the chips."""
         model = self.model(parameters)
         assert isinstance(model, TerrainModel)
         return self._with_rise(model.rise_m(self.frame.enter(self.px)))
 
     def _with_rise(self, rise_m: FloatArray) -> Family:
-        # Chips of unknown height say nothing on how heights displace.
+        # Chips of unknown height contribute nothing to the estimate of relief displacement.
         return replace(self, rise=np.nan_to_num(rise_m / self.scale_m)[:, None])
 
 

@@ -1,4 +1,4 @@
-"""The model that matches of keypoints agree on: its kind, its fit, and how it varies."""
+"""The model on which keypoint matches agree: its kind, its fit, and its variation."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ from ..rasters.grid import FloatArray, apply_affine
 from .alignment import LINEAR_CANDIDATES
 from .matcher import Correspondences
 
-# Matches further off than this are outliers whatever the model, in pixels.
+# Matches farther than this from a model of any kind are outliers, in pixels.
 _FAR_PX = 3.0
 
-# So many matches that agree elsewhere make a rival, if they are this share of those that agree on
-# the model, and random ones would hardly ever (log10) agree so. Real pairs: -1.2 at most.
+# Outliers of a model that agree with one another make a rival if there are at least this many, they
+# are this share of those that agree on the model, and random matches would hardly ever (log10)
+# agree so. Real pairs: -1.2 at most.
 _FEWEST_RIVALS = 10
 _RIVAL_SHARE = 0.1
 _RIVAL_ALARMS = -10.0
@@ -36,13 +37,13 @@ _RIVAL_ALARMS = -10.0
 
 @dataclass(frozen=True)
 class ConsensusFit(Fitted):
-    """A model that matches agree on; `mixture` has which are inliers."""
+    """A model on which matches agree; `mixture` marks the inliers."""
 
     mixture: Mixture
 
 
 def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -> ConsensusFit:
-    """Fit a model to matches of which most may be outliers.
+    """Fit a model to matches, most of which may be outliers.
 
     Parameters
     ----------
@@ -51,9 +52,10 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
     matches
         The matches, in matching pixels.
     prior
-        What the input was resampled by for matching: from such positions to nominal ones.
+        The transform by which the input was resampled for matching, from matching pixels to
+        nominal ones.
     seed
-        Of random samples.
+        Seed of the random samples.
 
     Raises
     ------
@@ -63,8 +65,8 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
     px, window_area = matches.px, matches.window_area_px2
     if len(px) <= PARAMETERS["affine"] // 2:
         raise TooFewPointsError(f"only {len(px)} features were matched")
-    # Where most are outliers, samples of two matches are without one far more often than those of
-    # three; the prior has taken out what a similarity lacks.
+    # If most matches are outliers, samples of two are free of them far more often than samples of
+    # three. A similarity is enough, as the prior has removed the rest of the distortion.
     residual = find_consensus(px, matches.partner_px, CONSENSUS_PX, first_kind(kind), seed)
     start = fit_model("affine", px, apply_affine(prior, residual(px)))
     nominal_px = apply_affine(prior, matches.partner_px)
@@ -79,27 +81,27 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
 
 
 def first_kind(kind: str) -> str:
-    """Return the kind of a first model, a similarity at most, of one that is asked for."""
+    """Return the kind of the first model, at most a similarity, for a requested kind."""
     return kind if kind in ("translation", "rigid") else "similarity"
 
 
 def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> None:
     """Refuse a model if many of its outliers agree on a shift from it.
 
-    Forests and cities lie on other transforms than the ground between radar images of different
-    incidence angles, each as firm in itself as the ground.
+    Between radar images of different incidence angles, forests and cities follow other transforms
+    than the ground, each as consistent in itself as the ground.
 
     Parameters
     ----------
     matches, prior
         See `fit_matches`.
     model
-        What was fitted to them.
+        The model that was fitted to the matches.
 
     Raises
     ------
     NothingFoundError
-        There is such a shift.
+        Outliers agree on such a shift.
     """
     residual = apply_affine(prior, matches.partner_px) - model(matches.px)
     length = np.hypot(*residual.T)
@@ -114,8 +116,8 @@ def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> N
         return int((np.hypot(*(residual - on).T) <= CONSENSUS_PX).sum())
 
     others = agreeing(shift)
-    # Along roads and between crowns matches slip to both sides alike; elevated objects are
-    # displaced to one.
+    # Along roads and between tree crowns, matches slip to both sides alike; elevated objects are
+    # displaced to one side.
     displaced = others - agreeing(-shift)
     probability = np.pi * CONSENSUS_PX**2 / matches.window_area_px2
     alarms = log10_false_alarms(others, len(at), probability, 1)
@@ -130,7 +132,8 @@ def require_no_rival(matches: Correspondences, prior: Affine, model: Model) -> N
 def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: float) -> str:
     """Return the simplest kind of model that the matches justify.
 
-    Its score is minus the squared distance from a model without the match, at most an outlier's.
+    A match scores minus its squared distance from a model fitted without it, limited to that of
+    an outlier.
     """
 
     def fit(kind: str) -> tuple[str, FloatArray]:
@@ -146,6 +149,6 @@ def _choose(px: FloatArray, nominal_px: FloatArray, start: Model, window_area: f
             raise TooFewPointsError(f"only {agreeing} of {len(px)} features agree with a model")
         return kind, -(np.minimum(distance, _FAR_PX) ** 2)
 
-    # What bends between radar images of other incidence angles are mostly forests and cities, by
-    # their relief displacement, and not the ground.
+    # Linear models only: bending between radar images of different incidence angles is mostly
+    # relief displacement of forests and cities, not of the ground.
     return choose_simplest(LINEAR_CANDIDATES, fit, px, np.full(len(px), -(_FAR_PX**2)))[0]

@@ -10,7 +10,7 @@ from ..rasters.grid import Grid
 
 
 def on_grid(model: Model, grid: Grid) -> Affine:
-    """Return a model of degree 1 of map positions as an affine transform of a grid's pixels."""
+    """Return a model of map positions, of degree 1, as an affine transform of a grid's pixels."""
     origin, right, down = grid.map_to_pixel(model(grid.pixel_to_map([[0, 0], [1, 0], [0, 1]])))
     along, across = right - origin, down - origin
     return Affine(along[0], across[0], origin[0], along[1], across[1], origin[1])
@@ -22,9 +22,9 @@ def compose(model: Model, correction: Model, level: Grid) -> Model:
     Parameters
     ----------
     model
-        Of map positions.
+        A model of map positions.
     correction
-        Of pixel positions of the level.
+        A model of pixel positions of the level.
     level
         A grid on the map.
     """

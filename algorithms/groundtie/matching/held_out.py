@@ -1,4 +1,4 @@
-"""What is held out of everything but the check: one object that every earlier step asks."""
+"""The mask of pixels held out of every step before the check."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .layout import ChipLayout, lay_out_chips
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The blocks of the reference that nothing but check chips may see.
+    """The blocks of the reference that only check chips may see.
 
-    Called with a grid on the map, it returns which of its pixels are to be masked.
+    Called with a grid on the map, it returns which of its pixels to mask.
 
     Parameters
     ----------
     layout
-        The chips of the fit and the check chips, with the blocks between them.
+        The chips of the fit, the check chips, and the held-out blocks.
     grid
         The matching grid, which the layout covers.
     reference_grid
-        The reference's own pixels.
+        The reference's own grid.
     """
 
     layout: ChipLayout
@@ -39,10 +39,10 @@ class HeldOut:
         return cls(lay_out_chips(pair), pair.grid, pair.reference.source.grid)
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
-        """Return which pixels of a grid, of any pixel size, see a part of held-out blocks, (h, w).
+        """Return which pixels of a grid, of any pixel size, depend on held-out blocks, (h, w).
 
-        Mostly it is a part of the matching grid itself or of a coarser one along its axes,
-        of which whole columns and rows are asked for; pixels of others are asked for one by one.
+        The grid is mostly a part of the matching grid or of a coarser one along its axes, which is
+        evaluated by whole columns and rows; other grids are evaluated pixel by pixel.
         """
         cols, rows = np.arange(piece.width, dtype=float), np.arange(piece.height, dtype=float)
         reach = self._reach_px(piece)
@@ -57,19 +57,19 @@ class HeldOut:
         return self.grid.map_to_pixel(piece.pixel_to_map(px))
 
     def _has_axes_of(self, piece: Grid) -> bool:
-        """Return whether columns and rows of a piece lie along those of the matching grid."""
+        """Return whether columns and rows of a piece are parallel to those of the matching grid."""
         across = compose(~self.grid.transform, piece.transform)
         off_px = max(abs(across.d) * piece.width, abs(across.b) * piece.height)
         return bool(off_px < POSITION_ERROR_PX)
 
     def _reach_px(self, piece: Grid) -> float:
-        """Return how far off a piece's pixel sees of the reference, in matching pixels."""
+        """Return how far a piece's pixel reaches into the reference, in matching pixels."""
         size, matching, piece_size = (
             grid.pixel_size[0] for grid in (self.reference_grid, self.grid, piece)
         )
         if np.allclose([matching / size, piece_size / size], 1.0) and self._has_axes_of(piece):
             return 0.0  # the reference's own pixels
-        # Others are interpolated between the reference's, larger ones between means of these, along
-        # the reference's axes: see `warping.sample`.
+        # Other pixels are interpolated between the reference's pixels, and larger ones between
+        # means of these, along the reference's axes: see `warping.sample`.
         averaged = max(round(piece_size / size), 1)
         return (REACH["cubic"] + 0.5) * averaged * size / matching

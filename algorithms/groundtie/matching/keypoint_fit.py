@@ -1,8 +1,8 @@
-"""Fits that start from keypoints near where a coarse model puts them ([Suri2010] 6.9).
+"""Fits that start from keypoints near their positions predicted by a coarse model.
 
-Mutual information on reduced images has found the coarse model; keypoints are matched without a
-limit on the ratio, but only near their prediction. Most of these matches are outliers, which
-fall anywhere in the gate; a robust fit finds the inliers. Chips may refine their places.
+Mutual information on reduced images has found the coarse model. Keypoints are matched without a
+limit on the ratio, but only near their predicted positions ([Suri2010] 6.9). Most matches are
+outliers anywhere in the gate; a robust fit finds the inliers, which chips may refine.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from .keypoints import KeypointMatcher
 from .matcher import Correspondences, Places
 from .surface_fit import SurfaceFit
 
-# Chips around matches: how large, and how far they are moved: by so many standard deviations of the
-# first model's predictions, within these limits.
+# Chips around matches: their side, and their search radius in standard deviations of the first
+# model's predictions, within these limits.
 _CHIP_PX = 81
 _CHIP_SIGMAS, _CHIP_RADIUS_PX = 3.0, (4, 12)
 
-# They are matched again from where the model is then until they move it little: at most so often in
+# Chips are matched again from the updated model until it hardly changes, at most this many times in
 # all.
 _ROUNDS = 3
 
-# Of the matches in each of so many cells a side the best is refined.
+# Number of cells along the longer side; the best match of each cell is refined.
 _CHIP_CELLS = 14
 
-# Forests and cities have more keypoints than fields, with relief displacement. So that they do
-# not outvote the ground, no cell has more than so many matches.
+# Forests and cities have more keypoints than fields, and relief displacement. To keep them from
+# outvoting the ground, the number of matches per cell is limited.
 _CELL_PX, _PER_CELL = 64.0, 6
 
-# Right matches lie this near a polynomial where a thin-plate spline is to bend further.
+# Correct matches lie within this distance of the polynomial that a thin-plate spline refines.
 _TPS_RADIUS_PX = 5.0
 
 
@@ -56,11 +56,11 @@ class KeypointFit:
     Parameters
     ----------
     matcher
-        Matches keypoints, of which the reference's see nothing of what is held out.
+        Matches keypoints, without the held-out blocks of the reference.
     chips
         Fits a model to chips alone where too few keypoints match; its matcher has the masks.
     refinement
-        What chips around the keypoints, and others between them, are matched by.
+        Matches chips around the keypoints, and others between them.
     """
 
     matcher: KeypointMatcher
@@ -73,7 +73,7 @@ class KeypointFit:
         Parameters
         ----------
         coarse
-            The misregistration on the map, a model of degree 1; it may be wrong by the gate.
+            The misregistration on the map, a model of degree 1; its error may be up to the gate.
         kind
             One of `models.KINDS`, or "auto" for the simplest polynomial that the matches justify.
         context
@@ -84,14 +84,14 @@ class KeypointFit:
         TooFewPointsError
             Too few matches agree on a model.
         NothingFoundError
-            Many of them agree on two.
+            Many matches agree on a second model.
         """
-        # A spline is fitted last, to what agrees with a polynomial.
+        # A spline is fitted last, to the matches that agree with a polynomial.
         first = AUTO if kind == "tps" else kind
         try:
             matches, fit = agreeing_keypoints(self.matcher, coarse, first, context.part(0.0, 0.7))
         except TooFewPointsError:
-            # What "auto" chooses among chips may bend more than matches of keypoints may.
+            # With chips, "auto" could choose a more flexible model than keypoints may have.
             chips_kind = "affine" if kind == AUTO else kind
             return self.chips.estimate(coarse, chips_kind, context.part(0.7, 1.0))
         try:
@@ -101,7 +101,7 @@ class KeypointFit:
             # agree, the coarse model may still be right.
             known = apply_affine(on_grid(coarse, self._grid), matches.px)
             model = fit_model("affine", matches.px, known)
-            # Without models of its folds: how far it may be wrong is unknown.
+            # No fold models: the uncertainty of the coarse model is unknown.
             start = ConsensusFit(model, (), fit.mixture)
             refined = self._refined(first, matches, coarse, start, context.part(0.7, 1.0))
         return self._estimate(kind, *refined)
@@ -118,10 +118,10 @@ class KeypointFit:
         fit: ConsensusFit,
         context: Context,
     ) -> tuple[Correspondences, Model, ConsensusFit]:
-        """Return chips around keypoints, the model that they were resampled by, and their fit.
+        """Return matches of chips around keypoints, the model used for resampling, and the fit.
 
-        Matches with larger errors may have led the first model, `fit`, astray: if chips show it,
-        they are matched again from their own.
+        Matches with larger errors may have biased the first model, `fit`. If the chips move it
+        much, they are matched again from their own model.
         """
         chips = self.refinement
         nominal_px = apply_affine(on_grid(coarse, self._grid), matches.partner_px)
@@ -158,7 +158,7 @@ class KeypointFit:
             input_px=pair.transform(coarse)(grid.pixel_to_map(matches.partner_px)),
             score=matches.score,
             covariance_px2=np.broadcast_to(np.eye(2) * sigma**2, (count, 2, 2)).copy(),
-            # Peaks are those of both ways together.
+            # Peaks are those of both directions together.
             forward_backward_error_px=np.zeros(count),
             is_check=np.zeros(count, bool),
             state=np.full(count, USED),
@@ -169,31 +169,31 @@ class KeypointFit:
 
 @dataclass(frozen=True)
 class GuidedFit:
-    """Fits a model to chips all over a pair, around the one that keypoints agree on.
+    """Fits a model to chips all over a pair, starting from the model that keypoints agree on.
 
-    Keypoints locate an image whose bands or light differ from a coarse model that is many pixels
-    off. They lie where edges are strongest: on roofs, walls and crowns, which may be displaced
-    against the ground. Chips on a regular layout show everything by its area. Source: [Patel2017]
-    4, [Suri2010] 6.9.
+    Keypoints locate images of different bands or illumination even if the coarse model is many
+    pixels off. They lie where edges are strongest: on roofs, walls and tree crowns, which may be
+    displaced against the ground. Chips on a regular layout weight everything by its area. Source:
+    [Patel2017] 4, [Suri2010] 6.9.
 
     Parameters
     ----------
     matcher
         Matches keypoints.
     chips
-        Fits the model; it sees no more than `matcher`.
+        Fits the model; its matcher sees no more than `matcher`.
     """
 
     matcher: KeypointMatcher
     chips: SurfaceFit
 
     def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
-        """Match keypoints near a coarse model and chips near theirs, and fit a model to the chips.
+        """Match keypoints near a coarse model, and fit a model to chips near the keypoints' model.
 
-        Parameters and errors as `KeypointFit.estimate` has them; what "auto" chooses from is the
-        chips' own.
+        Parameters and errors as in `KeypointFit.estimate`; "auto" chooses from the candidates of
+        `chips`.
         """
-        # Keypoints need agree on no more to predict where chips match; few matches are enough.
+        # A simple model of the keypoints, for which few matches are enough, predicts the chips.
         first, part = first_kind(kind), context.part(0.0, 0.6)
         _, fit = agreeing_keypoints(self.matcher, coarse, first, part)
         model = fit.model.on_map(self.matcher.pair.grid.centre_transform)
@@ -203,9 +203,9 @@ class GuidedFit:
 def agreeing_keypoints(
     matcher: KeypointMatcher, coarse: Model, kind: str, context: Context
 ) -> tuple[Correspondences, ConsensusFit]:
-    """Return matches of keypoints, few enough of each place, and the model of most of them.
+    """Return keypoint matches, limited in number per cell, and the model that most agree on.
 
-    Parameters and errors as `KeypointFit.estimate` has them.
+    Parameters and errors as in `KeypointFit.estimate`.
     """
     everywhere = matcher.match(coarse, GATE_PX, context)
     found = everywhere.take(best_of_cells(everywhere.px, everywhere.score, _CELL_PX, _PER_CELL))
@@ -216,7 +216,7 @@ def agreeing_keypoints(
 
 
 def far_from(px: FloatArray, others: NDArray[np.int_], reach_px: float) -> FloatArray:
-    """Return those of other positions, shape (m, 2), from which all of `px` are further away."""
+    """Return the positions of `others`, shape (m, 2), farther than `reach_px` from all of `px`."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import; all tools import this module
 
     distance, _ = cKDTree(px).query(others)
@@ -226,18 +226,18 @@ def far_from(px: FloatArray, others: NDArray[np.int_], reach_px: float) -> Float
 def best_of_cells(
     px: FloatArray, score: FloatArray, cell_px: float, count: int
 ) -> NDArray[np.int_]:
-    """Return which points to take: of those in each square cell the best, at most so many.
+    """Return the indices of the best points of each square cell.
 
     Parameters
     ----------
     px
         Positions, shape (n, 2).
     score
-        What is better, shape (n,).
+        Quality of the points, larger is better, shape (n,).
     cell_px
         Side of the cells.
     count
-        How many of each are taken.
+        Most points taken per cell.
     """
     cells = np.floor(px / max(cell_px, 1e-9)).astype(int)
     _, cell = np.unique(cells, axis=0, return_inverse=True)

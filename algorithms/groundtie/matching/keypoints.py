@@ -1,4 +1,4 @@
-"""Keypoints matched all over a pair, tile by tile, near where a coarse model puts them."""
+"""Keypoints matched all over a pair, tile by tile, near positions predicted by a coarse model."""
 
 from __future__ import annotations
 
@@ -19,32 +19,34 @@ from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
 from .matcher import Correspondences, MaskOf
 
-# A keypoint lies in a part of an image if all within so many of its scales belongs to it.
+# A keypoint lies in a part of an image if the part covers everything within this many of the
+# keypoint's scales.
 _INSIDE_SCALES = 1.5
 
-# More keypoints than this in a tile make matching longer, not better.
+# More keypoints per tile make matching slower, not better.
 _MOST_PER_TILE = 6000
 
-# A partner without a rival in its gate is as much nearer than the next as this, at most.
+# Largest score: the ratio of the descriptor distances of the next candidate in the gate and of the
+# partner. It is also the score if there is no other candidate.
 _LARGEST_SCORE = 10.0
 
 
 @dataclass(frozen=True)
 class KeypointMatcher:
-    """Matches keypoints of a pair on its matching grid, near where a coarse model puts them.
+    """Matches keypoints on a pair's matching grid, near positions predicted by a coarse model.
 
     Parameters
     ----------
     pair
         The images.
     detector, descriptor
-        How keypoints are found and described.
+        The keypoint detector and descriptor.
     held_out
-        Returns for a piece of the grid which pixels of the reference must not be seen; None: all
-        may be.
+        Takes a piece of the grid and returns which pixels of the reference are hidden; None: none.
     shown
-        The images with masks of what may be matched, as level ground; keypoints elsewhere are left
-        out, but those beside see all of the images. None: all may be.
+        The images with masks of the parts that may be matched, such as level ground. Keypoints
+        outside the masks are left out; descriptors of the others still use all of the images.
+        None: all may be matched.
     """
 
     pair: ImagePair
@@ -61,14 +63,14 @@ class KeypointMatcher:
         model
             The misregistration on the map as known so far.
         radius_px
-            How far a partner may lie from where the model predicts it.
+            Largest distance of a partner from its position predicted by the model.
         context
             Threads and progress.
         """
         match_tile = partial(self._match_tile, coarse=model, gate=radius_px)
         parts = context.map(match_tile, list(tiles(self.pair.grid)))
         px, partner_px, ratio = map(np.concatenate, zip(*parts, strict=True))
-        # The better, the farther the next one in the gate is.
+        # The farther the next descriptor in the gate, the better the match.
         score = 1 / np.maximum(ratio, 1 / _LARGEST_SCORE)
         return Correspondences(px, partner_px, score, float(np.pi * radius_px**2))
 
@@ -83,7 +85,7 @@ class KeypointMatcher:
         to_input_px = self.pair.transform(coarse)
         input = self.pair.input_patch(piece, to_input_px)
         if masked is not None:
-            # Where a descriptor sees less of the one image, it sees as little of the other.
+            # Masked in both images, so that descriptors lack the same part in each.
             input = Patch(input.values, input.valid & ~masked)
         core = Window(tile.col - area.col, tile.row - area.row, tile.width, tile.height)
         parts: tuple[Mask | None, Mask | None] = None, None
@@ -111,7 +113,7 @@ class KeypointMatcher:
         )
 
     def _features(self, patch: Patch, window: Window, part: Mask | None) -> Keypoints:
-        """Return the strongest keypoints in a window of a patch, of those in a part of it."""
+        """Return the strongest keypoints in a window of a patch that lie in a part of it."""
         found = self.detector.detect(patch)
         found = found.take(inside(found.position_px, window))
         return (found if part is None else lying_in(found, part)).strongest(_MOST_PER_TILE)
@@ -123,9 +125,9 @@ def lying_in(found: Keypoints, part: Mask) -> Keypoints:
 
 
 def seen_around(tile: Window, grid: Grid, gate: int) -> Window:
-    """Return what is read for a tile: where partners may lie, and what these see within the grid.
+    """Return the window to read for a tile: possible partners and the margin of their descriptors.
 
-    Further beyond the grid mostly nothing is valid, and all that is done there is done in vain.
+    It reaches beyond the grid by no more than the gate: farther out, hardly any pixel is valid.
     """
     whole = Window(0, 0, *grid.size)
     return tile.widened(gate + MARGIN_PX).common(whole.widened(gate))

@@ -1,9 +1,9 @@
-"""Where chips lie in the matching grid, and which blocks of it are held out for the verdict.
+"""Layout of chips in the matching grid, and of the blocks held out for the verdict.
 
-The scene is divided into cells. The middle of each, a block of 60 % of its side, is held out: its
-pixels of the reference take no part in the coarse search, the tie points of the fit, the choice of
-the model or the removal of outliers. Check chips lie inside the blocks, chips of the fit on the
-lines between them.
+The scene is divided into cells. In the middle of each cell, a block of 60 % of its side is held
+out: the reference pixels in it take no part in the coarse search, the tie points of the fit, the
+choice of the model or the removal of outliers. Check chips lie inside the blocks, chips of the fit
+on the lines between the cells.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from ..errors import NoOverlapError
 from ..rasters.grid import mesh
 from ..rasters.pair import ImagePair
 
-# Share of a cell's side that is held out. Check chips stand alone, so they get the larger part;
-# chips of the fit share the rest of the cell and support each other.
+# Share of a cell's side that is held out. Check chips must match on their own, so they get the
+# larger part; chips of the fit share the rest of the cell and support each other.
 _HELD_OUT = 0.6
 
-# Cells along a scene's shorter side: so many, and one more for each of these pixels.
+# Number of cells along a scene's shorter side: the first, plus one for every `_CELL_PX` pixels.
 _FIRST_CELLS, _CELL_PX = 2.2, 300
 _FEWEST_CELLS, _MOST_CELLS = 3, 6
 
@@ -30,10 +30,10 @@ _FEWEST_CELLS, _MOST_CELLS = 3, 6
 _CHIP_RANGE_PX = (24, 80)
 _LARGEST_CHECK_CHIP_PX = 112
 
-# Of the smallest chips, two cells and the rim.
+# Two cells and the rim, with the smallest chips.
 _LEAST_OVERLAP_PX = round(_CHIP_RANGE_PX[0] * (1 + 2 / (1 - _HELD_OUT)))
 
-# Above so many chips of the fit they are laid out half as densely.
+# Above this number, chips of the fit are laid out half as densely.
 _MANY_CHIPS = 200
 
 
@@ -47,7 +47,7 @@ def default_chip_px(width: int, height: int) -> int:
 
 @dataclass(frozen=True)
 class Axis:
-    """The cells along one side of the scene: its size and the chips', in matching pixels."""
+    """The cells along one side of the scene; `size` and `chip` are in matching pixels."""
 
     size: int
     chip: int
@@ -69,19 +69,19 @@ class Axis:
         return _HELD_OUT * self.pitch
 
     def held_out(self, positions: NDArray[np.float64], reach_px: float = 0.0) -> NDArray[np.bool_]:
-        """Return which pixel positions lie in the held-out part of their cell, or within reach."""
+        """Return which positions lie in the held-out part of their cell, or within reach of it."""
         phase = ((positions - self.first) / self.pitch) % 1.0
         inside = (positions >= self.first) & (positions <= self.first + self.cells * self.pitch)
-        # A chip of the fit may end exactly at the block, whatever the last digit is.
+        # A chip of the fit may end exactly at the block, whatever rounding does to the last digit.
         half = _HELD_OUT / 2 + reach_px / self.pitch - 1e-9
         return np.asarray(inside & (np.abs(phase - 0.5) < half))
 
     def divided(self, parts: int) -> NDArray[np.float64]:
-        """Return positions that divide each cell into so many parts, lines included."""
+        """Return positions that divide each cell into equal parts, cell borders included."""
         return np.asarray(self.first + np.arange(self.cells * parts + 1) * self.pitch / parts)
 
     def check_centres(self, check_chip: int) -> NDArray[np.float64]:
-        """Return the centres of chips inside the held-out blocks, one or two a block."""
+        """Return the centres of chips inside the held-out blocks, one or two per block."""
         middles = np.asarray(self.first + (np.arange(self.cells) + 0.5) * self.pitch)
         # Rounding a centre moves a chip by half a pixel; it must stay inside its block.
         half = (self.block - check_chip) / 2 - 1
@@ -99,7 +99,7 @@ class ChipLayout:
     columns, rows
         The cells along both sides.
     parts
-        Into how many parts the chips of the fit divide a cell's side, 2 or 4.
+        Number of parts into which chips of the fit divide a cell's side, 2 or 4.
     """
 
     columns: Axis
@@ -140,7 +140,7 @@ class ChipLayout:
         return _middle_pixels(mesh(*sides), chip)
 
     def neighbourhoods(self, centres_px: NDArray[np.int_]) -> NDArray[np.int_]:
-        """Return which of the squares of 2 × 2 cells positions (col, row), (n, 2), lie in."""
+        """Return the number of the square of 2 × 2 cells that holds each (col, row), (n, 2)."""
         col, row = (
             ((centres_px[:, k] - axis.first) // (2 * axis.pitch)).astype(int)
             for k, axis in enumerate((self.columns, self.rows))
@@ -152,14 +152,14 @@ class ChipLayout:
     ) -> NDArray[np.bool_]:
         """Return which positions on the matching grid are held out; shapes broadcast.
 
-        Whoever stands for more than its position, as interpolated pixels do, is held out, too,
-        if it reaches a held-out block: it lies within `reach_px`.
+        A sample that depends on its surroundings, such as an interpolated pixel, is held out, too,
+        if it lies within `reach_px` of a held-out block.
         """
         return self.columns.held_out(cols, reach_px) & self.rows.held_out(rows, reach_px)
 
 
 def _middle_pixels(centres: NDArray[np.float64], chip_px: int) -> NDArray[np.int_]:
-    """Return the middle pixels of the chips whose pixels lie best around centres."""
+    """Return the middle pixels of the chips whose pixels are best centred on positions."""
     corners = np.round(centres - (chip_px - 1) / 2).astype(int)
     return np.asarray(corners + chip_px // 2)
 
@@ -170,7 +170,7 @@ def lay_out_chips(pair: ImagePair) -> ChipLayout:
     Raises
     ------
     NoOverlapError
-        The overlap is too small for two cells of chips each way.
+        The overlap is too small for two cells of chips along each side.
     """
     if min(pair.overlap_px) < _LEAST_OVERLAP_PX:
         raise NoOverlapError(

@@ -1,4 +1,4 @@
-"""A better model of degree 1 from the chips of one level of the image pyramid."""
+"""Refinement of a model of degree 1 by the chips of one level of the image pyramid."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from .frames import compose
 from .matcher import Places
 from .pooled import PooledHistogramMatcher
 
-# Chips at every level of the pyramid, in pixels of the level.
+# Most chips along a side at every level of the pyramid, and their side in pixels of the level.
 _CHIPS_PER_SIDE = 7
 _CHIP_RANGE_PX = (48, 80)
 
-# Side of the chips with a joint histogram in common.
+# Side of the chips that share a joint histogram.
 _POOLED_CHIP_PX = 64
 
 
 @dataclass(frozen=True)
 class CoarseModel:
-    """A model of the misregistration on the map, and how likely it is to be none at all.
+    """A model of the misregistration on the map, and its expected number of false alarms.
 
-    `log10_false_alarms` is log10 of the expected number of models that random matches would
-    agree with as well.
+    `log10_false_alarms` is log10 of the expected number of models with which random matches would
+    agree as well.
     """
 
     model: Model
@@ -55,7 +55,7 @@ def fit_level(
     model
         The misregistration on the map as known so far.
     radius_px
-        How far it may be wrong, in pixels of the level.
+        Largest error of the model, in pixels of the level.
     context
         Threads and progress.
     """
@@ -73,8 +73,8 @@ def fit_level(
     best = CoarseModel(model, np.inf)
     probability = agreement_probability(TOLERANCE_PX, radius_px)
     found = px + peak_shifts(supported)
-    # Simple models are preferred unless the data favour others: each has its number of hypotheses
-    # counted against it.
+    # Simple models are preferred unless the data favour others, as the number of hypotheses counts
+    # against each.
     for kind in LINEAR_CANDIDATES:
         fitted = find_consensus(px, found, TOLERANCE_PX, kind)
         # Peaks after belief propagation are not independent; only the chips' own are counted.
@@ -88,7 +88,7 @@ def fit_level(
 def fit_level_pooled(
     matcher: PooledHistogramMatcher, level: Grid, model: Model, radius_px: int, context: Context
 ) -> Model:
-    """Return a better affine model by all that a mask leaves on a level of the pyramid.
+    """Return an affine model refined by all unmasked content of a level of the pyramid.
 
     Parameters as `fit_level`.
 

@@ -1,8 +1,8 @@
-"""Pixel-locked content: structure that is the same in both arrays, wherever the ground lies.
+"""Pixel-locked content: structure that is identical in both arrays, wherever the ground lies.
 
 Labels, frames, watermarks, clouds of one deck, tiles of one mosaic and the pattern of one sensor
-are drawn at a column and row, or on the map, which another grid has at other columns and rows. Two
-images that share them match there, whatever ground they show.
+are fixed to columns and rows, or to map positions, which have other columns and rows in another
+grid. Two images that share such drawn content match where it coincides, whatever ground they show.
 """
 
 from __future__ import annotations
@@ -30,43 +30,45 @@ from .chip_windows import ChipWindows, Resampled, singly
 from .matcher import Places
 from .shared_content import Sensors, SharedContent
 
-# Steps between whole columns are compared unresampled, radar images as if on whole pixels, where a
-# transform is so near to those.
+# If a transform is this close to whole pixels, steps between whole columns are compared without
+# resampling, and radar images count as shifted by whole pixels.
 _NEAR_PX = 1.5
 
-# What is drawn lies on whole pixels all over; of other pairs, one in 64 lies as near by chance.
-# Measured (suite attacks): drawn mostly up to 0.05; of 127 right pairs on one grid none as near is
-# refused, but some beyond 0.09, and one of the suite series at 0.08.
+# Drawn content lies on whole pixels everywhere; one in 64 other pairs lies as close by chance.
+# Measured (suite attacks): drawn content is mostly within 0.05. Of 127 correct pairs on one grid
+# none this close is refused, but some beyond 0.09 are, and one of the suite series at 0.08.
 EXACT_PX = 0.0625
 
-# Where what is drawn deceives, transforms lie within so many times of what counts as exact of whole
-# pixels of the array, or within the second of what is nominal: of two cameras' images 10 of 11, of
-# right transforms 6 of 18 (suite margins, --seeds 87000-87029 --sample 120).
+# Transforms misled by drawn content lie within the first, in units of the exactness limit, of whole
+# pixels of the array, or within the second of the nominal geotransform. For images of two cameras,
+# 10 of 11 of them do, and 6 of 18 correct transforms (suite margins, --seeds 87000-87029 --sample
+# 120).
 WHOLE_TIMES_EXACT, NOMINAL_PX = 4, 1.5
 
-# Around an edge, chips see it this far off; around a seam, which is long, as far as filters reach.
+# An edge affects chips within this distance; a seam, which is long, as far as the filters reach.
 _EDGE_SURROUNDINGS_PX = 9
 _SEAM_SURROUNDINGS_PX = 2 * BORDER_PX + 1
 
-# Around a part that is masked, what lies there is looked at, too.
+# Content within this margin of a piece affects its mask.
 _RIM_PX = 2 * REACH_PX
 
 
 @dataclass(frozen=True)
 class LockedContent:
-    """Which pixels of the reference the input repeats where both are drawn alike.
+    """A mask of the reference pixels whose content the input repeats.
 
-    Called with a part of the matching grid, it returns their surroundings, as `HeldOut` does.
+    Called with a part of the matching grid, as `HeldOut` is, it returns the surroundings of these
+    pixels.
 
     Parameters
     ----------
     pair
         The images.
     to_input
-        Takes map positions to where the input has what is drawn there, in its pixels: where the
-        transform has them, or the whole number of columns and rows off that it moves the array by.
+        Takes map positions to the input pixels that hold the same drawn content, by the transform
+        or by its shift of the array rounded to whole columns and rows.
     shared
-        What they have the same.
+        The content that they share.
     """
 
     pair: ImagePair
@@ -74,12 +76,12 @@ class LockedContent:
     shared: SharedContent
 
     def __call__(self, piece: Grid) -> NDArray[np.bool_]:
-        """Return which pixels of a part of the matching grid lie where both are the same, (h, w).
+        """Return which pixels of a part of the matching grid lie in identical content, (h, w).
 
-        What is drawn ends somewhere in the windows that vary alike: all of them is taken, unless
-        the surroundings are one camera's views of the ground, and what is around edges if they
-        or the transform are evidence. If the transform is, what follows in other colours is, too,
-        unless nearly everything does.
+        Drawn content ends somewhere inside the windows that vary alike. Whole windows are masked,
+        unless the images are copies or one camera's views of the ground. Surroundings of edges are
+        masked if the edges or the transform are evidence. If the transform is, so are windows
+        related in other colours, unless nearly all are.
         """
         patches = self._around(piece)
         windows = Windows.of(*patches)
@@ -95,7 +97,7 @@ class LockedContent:
         return _inner(same)
 
     def around_edges(self, piece: Grid) -> NDArray[np.bool_]:
-        """Return which pixels of a part lie around edges that coincide, whatever else, (h, w)."""
+        """Return which pixels of a part lie around coinciding edges, drawn or not, (h, w)."""
         return _inner(covered(drawn_edges(*self._around(piece)), _EDGE_SURROUNDINGS_PX))
 
     def _around(self, piece: Grid) -> tuple[Patch, Patch]:
@@ -117,30 +119,30 @@ def find_locked_content(
     context: Context,
     images: Resampled | None = None,
 ) -> LockedContent | None:
-    """Return what the images repeat where a transform has them.
+    """Find the content that two images aligned by a transform share.
 
     Parameters
     ----------
     pair
         The images.
     transform
-        What was found.
+        The transform that was found.
     places
-        Where it is looked for.
+        The chips that are compared.
     sensors
-        What the images may be.
+        Kinds of sensors that the images may come from.
     exact_px
-        Within this of whole pixels, what was found lies on them as exactly as it is known.
+        A transform within this distance of whole pixels lies on them within its accuracy.
     context
         Threads.
     images
-        The pair's, resampled by the transform with 21 px and more around them; None: they are
+        The pair's, resampled by the transform with a margin of at least 21 px; None: they are
         resampled here.
 
     Returns
     -------
-    None of an image in the geometry of its sensor, which repeats nothing that is drawn on a map,
-    unless the transform moves the array.
+    The shared content. None for an input in sensor geometry, which repeats nothing that is drawn
+    on a map, unless the transform shifts the array by whole pixels.
     """
     whole, off_px = _by_whole_pixels(pair, transform)
     to_input: PointFunction
@@ -153,7 +155,7 @@ def find_locked_content(
 
     def windows(by: PointFunction) -> ChipWindows:
         known = images if by is transform else None
-        # Chips may end a pixel beyond the grid.
+        # Chips may extend a pixel beyond the grid.
         seen = known or Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
         return ChipWindows(seen, places, LOOK_REACH_PX, None)
 
@@ -170,10 +172,7 @@ def find_locked_content(
 
 
 def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFunction, float]:
-    """Return the move by whole columns and rows nearest to a transform, and how far off it is.
-
-    The latter at most, in pixels.
-    """
+    """Return the whole-pixel shift nearest to a transform, and its largest deviation in pixels."""
     grid, reference = pair.grid, pair.reference.source.grid
     xy = grid.pixel_to_map(grid.places())
     found, there = transform(xy), reference.map_to_pixel(xy)
@@ -183,6 +182,6 @@ def _by_whole_pixels(pair: ImagePair, transform: Transform) -> tuple[PointFuncti
 
 
 def _off_nominal_px(grid: Grid, transform: Transform) -> float:
-    """Return how far at most a transform is from what is nominal, in pixels of a grid."""
+    """Return the largest distance of a transform from the nominal one, in pixels of a grid."""
     px = grid.places()
     return float(np.abs(grid.map_to_pixel(transform.model(grid.pixel_to_map(px))) - px).max())

@@ -1,9 +1,9 @@
-"""What matchers look for, and what they return.
+"""The inputs and results of matchers.
 
 A matcher finds where places of the reference lie in the input, given a model that is nearly right.
-There are three: `chips.ChipMatcher` (each chip by its own similarity surface) and
+There are three. `chips.ChipMatcher` (each chip by its own similarity surface) and
 `pooled.PooledHistogramMatcher` (chips that share one joint histogram) match `Places` and return
-`ChipSurfaces`; `keypoints.KeypointMatcher` matches keypoints all over the grid and returns
+`ChipSurfaces`. `keypoints.KeypointMatcher` matches keypoints all over the grid and returns
 `Correspondences`.
 """
 
@@ -32,11 +32,11 @@ class Places:
     Parameters
     ----------
     grid
-        Grid on which they are matched: the matching grid or a coarser level of it.
+        Grid on which the chips are matched: the matching grid or a coarser level of it.
     centres
-        Pixel positions (col, row) of their centres in the grid, shape (n, 2).
+        Pixel positions (col, row) of the chips' centres in the grid, shape (n, 2).
     chip_px
-        Their side.
+        Side of the chips.
     """
 
     grid: Grid
@@ -51,9 +51,9 @@ class Places:
 
     @classmethod
     def spread(cls, grid: Grid, chip_px: int, count: Callable[[int], float]) -> Places:
-        """Return chips from border to border, as many along a side as `count` has for its length.
+        """Return chips from border to border, equally spaced along each axis to a pixel.
 
-        They are equally far apart along each axis, to a pixel.
+        `count` takes the length of a side and returns the number of chips along it.
         """
         sides = (
             np.linspace(chip_px / 2, length - chip_px / 2, int(count(length)))
@@ -64,18 +64,18 @@ class Places:
 
 @dataclass(frozen=True)
 class Correspondences(Rows):
-    """Places of the reference and where they match in the input, as a model resampled it.
+    """Places of the reference and their matches in the input, resampled by a model.
 
     Parameters
     ----------
     px
         Pixel positions (col, row) in the grid, shape (n, 2).
     partner_px
-        Where they match, in pixels of the same grid, shape (n, 2).
+        Positions of their matches, in pixels of the same grid, shape (n, 2).
     score
-        The larger, the better the match, shape (n,).
+        Quality of the matches, larger is better, shape (n,).
     window_area_px2
-        Area over which outliers fall.
+        Area over which outliers are distributed.
     """
 
     px: FloatArray
@@ -86,7 +86,7 @@ class Correspondences(Rows):
 
 @dataclass(frozen=True)
 class ChipSurfaces:
-    """Similarity surfaces of chips on a grid: all that chips indicate, not their peaks alone.
+    """Similarity surfaces of chips on a grid: their full evidence, not the peaks alone.
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ class ChipSurfaces:
         Surfaces of reference chips in the input, shape (n, 2 r + 1, 2 r + 1).
     backward
         Surfaces of input chips in the reference, rotated by 180° so that they should peak at the
-        same place, same shape.
+        same place; same shape.
     weight
-        By how much each chip's surface counts in a fit, shape (n,).
+        Weight of each chip's surface in a fit, shape (n,).
     """
 
     centres: NDArray[np.int_]
@@ -113,7 +113,7 @@ class ChipSurfaces:
 
     @property
     def weighted(self) -> Surfaces:
-        """The sum of both directions, by how much it counts in a fit."""
+        """The sum of both directions, times the chip's weight in a fit."""
         return np.asarray(self.combined * self.weight[:, None, None], np.float32)
 
     @property
@@ -136,19 +136,19 @@ class ChipSurfaces:
         return Correspondences(px, px + shifts, heights, (2 * self.radius_px + 1.0) ** 2)
 
     def summed(self, groups: NDArray[np.int_]) -> ChipSurfaces:
-        """Return the weighted sums of groups of chips, at their middles.
+        """Return the weighted sums of groups of chips, at the groups' mean positions.
 
         Parameters
         ----------
         groups
-            The number of each chip's group, shape (n,).
+            Number of the group of each chip, shape (n,).
         """
         members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
         middles = [np.rint(self.centres[of].mean(axis=0)) for of in members]
         return self._sums(np.array(middles, int).reshape(-1, 2), members)
 
     def with_neighbours(self, spacing_px: float) -> ChipSurfaces:
-        """Return each chip's weighted sum with those around it, whose spacing is given."""
+        """Return the weighted sum of each chip and its neighbours, given the chips' spacing."""
         from scipy.spatial import cKDTree  # takes long to import; few scenes need it
 
         if len(self.centres) == 0:
@@ -158,7 +158,7 @@ class ChipSurfaces:
         return self._sums(self.centres, [np.sort(of) for of in members])
 
     def _sums(self, centres: NDArray[np.int_], members: list[NDArray[np.int_]]) -> ChipSurfaces:
-        """Return the weighted sums of chips, by number, for each of some centres."""
+        """Return the weighted sum at each centre; `members` holds the numbers of its chips."""
         weight = self.weight[:, None, None]
 
         def total(surfaces: Surfaces) -> Surfaces:

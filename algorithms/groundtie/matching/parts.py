@@ -1,9 +1,10 @@
-"""Parts of a pair that match elsewhere than a model has them.
+"""Parts of a pair that match elsewhere than a model predicts.
 
-Single chips match badly, but their similarity surfaces add up: what several of them have in common
-stands out of noise by the square root of their number. Where that lies elsewhere, and each of them
-is lower where the model has it, they do: a strip of another pass, a tile of another date, layover.
-They are neighbours: canopies are displaced, too, all over a scene that is registered right.
+Single chips match poorly, but their similarity surfaces add up: a peak common to several chips
+rises above the noise by the square root of their number. Chips form a part if they have a common
+peak elsewhere and each is lower where the model predicts it: a strip of another pass, a tile of
+another date, layover. They must be neighbours, as displaced canopies lie all over a scene that is
+registered correctly.
 """
 
 from __future__ import annotations
@@ -19,21 +20,21 @@ from ..geometry.judging import TOLERANCE_PX
 from ..rasters.grid import FloatArray, Grid, mesh
 from .belief_propagation import Surfaces
 
-# Farther from where the model has them, they lie elsewhere. What is highest still farther off may
-# be canopies of 30 m, in pixels of 1 m, and is a part only where it is an eighth of the chips: of
-# 607 right transforms canopies were as many in one (suites calibration --seeds 440-499 and, large
-# rural scenes, 440-565; simulated --seeds 201-206; real; attacks: controls --seeds 33000-33039); a
-# fifth of an image holds 7 of 49.
+# Chips farther from the model's prediction than the first lie elsewhere. Peaks beyond the second
+# may be canopies of 30 m, in pixels of 1 m, and are a part only if they are an eighth of the chips.
+# Of 607 correct transforms, canopies were as many in one (suites calibration --seeds 440-499 and,
+# large rural scenes, 440-565; simulated --seeds 201-206; real; attacks: controls --seeds
+# 33000-33039). A fifth of an image holds 7 of 49 chips.
 ELSEWHERE_PX, _CANOPIES_PX, _CANOPIES_SHARE = 2 * TOLERANCE_PX, 20.0, 1 / 8
 
-# Fewer chips are no part, and none counts for more than this.
+# Fewest chips of a part, and the largest similarity that one chip may contribute.
 _FEWEST_CHIPS = 3
 MOST_OF_ONE = 7.0
 
-# The highest chip of a part names the place where it lies, and the others confirm it. How much
-# higher they are there than where the model has them is their sum over the square root of their
-# number, in standard deviations of noise. It must be more than one chip may count for: two copies
-# of one chip and a third by chance, 1.6 high as some of 81 are, leave 8.6 / √2 = 6.1.
+# The highest chip of a part determines its shift, and the others confirm it. The excess is how much
+# higher these others are there than where the model predicts them: their sum over the square root
+# of their number, in standard deviations of noise. It must exceed what one chip may contribute: two
+# copies of one chip and a third by chance, 1.6 high as some of 81 are, leave 8.6 / √2 = 6.1.
 LEAST_EXCESS = MOST_OF_ONE
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
@@ -41,18 +42,18 @@ _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
 
 @dataclass(frozen=True)
 class Part:
-    """Neighbouring chips that together match elsewhere than a model has them.
+    """Neighbouring chips that together match elsewhere than a model predicts.
 
     Parameters
     ----------
     where
-        In which part of the grid the middle of them lies, such as "upper left".
+        Part of the grid in which their centre lies, such as "upper left".
     shift_px
-        By how much they lie elsewhere, (x, y) in pixels of the grid.
+        Their common shift from the model's prediction, (x, y) in pixels of the grid.
     excess
         See `LEAST_EXCESS`.
     members
-        Which chips of the survey they are, by number.
+        Their numbers among the chips of the survey.
     """
 
     where: str
@@ -62,19 +63,19 @@ class Part:
 
     @property
     def chips(self) -> int:
-        """How many chips they are."""
+        """Number of chips."""
         return len(self.members)
 
     @property
     def distance_px(self) -> float:
-        """How far off they lie."""
+        """Length of their shift."""
         return float(np.hypot(*self.shift_px))
 
 
 def find_parts(
     grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, least: float = LEAST_EXCESS
 ) -> Iterator[Part]:
-    """Yield parts, the most evident first; no chip is in two of them.
+    """Yield parts, the most evident first; no chip belongs to two of them.
 
     Parameters
     ----------
@@ -83,10 +84,10 @@ def find_parts(
     centres
         Pixel positions (col, row) of chips, shape (n, 2).
     surfaces
-        Their similarity around where the model has them, in robust standard deviations, shape
+        Their similarity around the model's prediction, in robust standard deviations, shape
         (n, 2 r + 1, 2 r + 1).
     least
-        The excess from which on they are parts.
+        The smallest excess of a part.
     """
     shifts, higher = _higher_elsewhere(surfaces)
     are_neighbours = _are_neighbours(centres)
@@ -103,11 +104,10 @@ def find_parts(
 def _highest_group(
     higher: FloatArray, are_neighbours: NDArray[np.bool_], which: NDArray[np.int_], least: float
 ) -> tuple[NDArray[np.int_], np.intp, float] | None:
-    """Return the neighbours that are highest together at one place, which place, and their excess.
+    """Return the neighbours with the largest excess, the index of their shift, and the excess.
 
-    Of all sets of so many chips, the highest at a place is that of the highest ones: so no more
-    sets need be looked at than there are chips [Neill2012]. Of that set, each group of neighbours
-    may be a part.
+    At a shift, the best set of a given size consists of the highest chips, so no more sets need be
+    tried than there are chips [Neill2012]. Each group of neighbours in the best set may be a part.
     """
     if len(which) < _FEWEST_CHIPS:
         return None
@@ -115,7 +115,7 @@ def _highest_group(
     best = None
     for place in np.argsort(-excesses):
         if excesses[place] < least:
-            break  # no group is higher than the set that it is of
+            break  # no group has a larger excess than the set that contains it
         highest = which[np.argsort(-higher[which, place])[: sizes[place]]]
         for group in _connected(highest, are_neighbours):
             if len(group) >= _FEWEST_CHIPS and _excess(higher[group, place]) >= least:
@@ -125,7 +125,7 @@ def _highest_group(
 
 
 def _higher_elsewhere(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
-    """Return places elsewhere, (x, y), shape (s, 2), and how much higher chips are, (n, s)."""
+    """Return shifts elsewhere, (x, y), (s, 2), and how much higher chips are there, (n, s)."""
     radius = surfaces.shape[-1] // 2
     shifts = mesh(*2 * [np.arange(-radius, radius + 1)])
     distance = np.hypot(*shifts.T)
@@ -136,7 +136,7 @@ def _higher_elsewhere(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
 
 
 def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
-    """Return for each place of how many chips, the highest ones, the excess is largest, and it."""
+    """Return for each shift the size and excess of the set of highest chips with most excess."""
     confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
     excess = confirming / np.sqrt(np.arange(1, len(higher)))[:, None]
     excess = excess[_FEWEST_CHIPS - 2 :]
@@ -149,7 +149,7 @@ def _excess(higher: FloatArray) -> float:
 
 
 def _are_neighbours(centres: NDArray[np.int_]) -> NDArray[np.bool_]:
-    """Return which chips of a regular layout are next to each other, (n, n), diagonals included."""
+    """Return which chips of a regular layout are adjacent, (n, n), diagonals included."""
     cols, rows = (np.unique(along, return_inverse=True)[1].reshape(-1) for along in centres.T)
     return np.asarray(
         (abs(np.subtract.outer(cols, cols)) <= 1) & (abs(np.subtract.outer(rows, rows)) <= 1)
@@ -159,19 +159,19 @@ def _are_neighbours(centres: NDArray[np.int_]) -> NDArray[np.bool_]:
 def _connected(
     chips: NDArray[np.int_], are_neighbours: NDArray[np.bool_]
 ) -> Iterator[NDArray[np.int_]]:
-    """Yield the groups of chips that neighbours connect."""
+    """Yield groups of chips connected by adjacency."""
     count, group = connected_components(are_neighbours[np.ix_(chips, chips)])
     for number in range(count):
         yield chips[group == number]
 
 
 def _limited(surfaces: Surfaces) -> Surfaces:
-    """Return surfaces, shape (n, h, w), of which none is higher than one chip counts."""
+    """Return surfaces, shape (n, h, w), scaled so that none is higher than `MOST_OF_ONE`."""
     highest = np.maximum(surfaces.max(axis=(1, 2), keepdims=True, initial=0.0), MOST_OF_ONE)
     return np.asarray(surfaces * (MOST_OF_ONE / highest))
 
 
 def _where(grid: Grid, px: FloatArray) -> str:
-    """Return in which third of a grid along each axis a position (col, row) lies."""
+    """Return the name of the thirds of a grid, along both axes, that hold a position (col, row)."""
     col, row = (min(int(3 * at / side), 2) for at, side in zip(px, grid.size, strict=True))
     return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"

@@ -1,7 +1,7 @@
-"""Where the input's ground lies that the reference does not explain, by phases all over a pair.
+"""Phase correlation, all over a pair, of the part of the input that the reference does not explain.
 
-Content that lies over both images, half transparent, is most of each: chips match where it is. The
-ground beneath, weak as it is, is moved by one shift all over, on which phases agree.
+A semi-transparent overlay in both images dominates them, so chips match where the overlay
+coincides. The ground beneath is weak, but has one shift everywhere, on which phases agree.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from .chips import LEAST_VALID_MASKED
 from .matcher import Places
 from .survey import SURVEY_RADIUS_PX, Survey
 
-# Windows of 192 px, as for bands, overlap by two thirds and reach beyond the borders, until there
-# are so many along a side.
+# Windows of 192 px, as for bands, overlap by two thirds and reach beyond the borders. Where the
+# largest number along a side is reached, they overlap less.
 _CHIP_PX, PHASES_REACH_PX, _MOST_ALONG = 64, 64, 7
 _SIDE_PX = _CHIP_PX + 2 * PHASES_REACH_PX
 
 
 def survey_unexplained(images: Resampled, elsewhere_px: float, context: Context) -> Survey:
-    """Correlate what the reference does not explain of the input with the reference, all over.
+    """Correlate the part of the input that the reference does not explain with the reference.
 
     Parameters
     ----------
     images
-        A pair's, resampled by what was found, with `PHASES_REACH_PX` around them.
+        A pair's, resampled by the transform that was found, with a margin of `PHASES_REACH_PX`.
     elsewhere_px
         See `Survey`.
     context
@@ -47,7 +47,7 @@ def survey_unexplained(images: Resampled, elsewhere_px: float, context: Context)
 
 
 def _surfaces(reference: Patch, left: Patch) -> Surface:
-    """Return normalised surfaces of a stack of windows; 0 where too little is left."""
+    """Return normalised surfaces of a stack of windows; 0 where too few pixels are valid."""
     agreed = phases(spectra(reference), spectra(left))
     surfaces = normalise(phase_surface(agreed, _SIDE_PX, SURVEY_RADIUS_PX))
     is_seen = left.valid.mean(axis=(1, 2), keepdims=True) >= LEAST_VALID_MASKED

@@ -1,8 +1,8 @@
-"""Chips that share one joint histogram, for masks that leave too little of each.
+"""Chips that share one joint histogram, for masks that leave too little of each chip.
 
-In towns a mask of the ground leaves a few per cent of a chip, too little for a joint histogram of
-its own. All chips of the fit together have one; the log likelihood ratio of its grey-level pairs
-measures how well each chip matches at each shift (see `similarity.pooled`).
+In towns a ground mask leaves a few per cent of a chip, too little for a joint histogram of its own.
+So all chips of the fit share one. The log likelihood ratio of its grey-level pairs measures how
+well each chip matches at each shift (see `similarity.pooled`).
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from .chip_windows import ChipWindows, Resampled, singly
 from .layout import ChipLayout
 from .matcher import ChipSurfaces, MaskOf, Places
 
-# Chips with less ground than this are left out; fewer pixels in all make no joint histogram, and
-# more are not needed for one.
+# Least share of ground in a chip. A joint histogram needs at least the first number of pixels, and
+# no more than the second.
 _LEAST_VALID = 0.02
 _LEAST_PIXELS, _MOST_PIXELS = 5_000, 4_000_000
 
-# The evidence of masked chips separates kinds of models badly, and linear distortion is common.
+# Masked chips have too little evidence to choose the kind of model; linear distortion is common.
 _AUTO_KIND = "affine"
 
 
 @dataclass(frozen=True)
 class PooledHistogramMatcher:
-    """Matches chips of a masked pair by a joint histogram of all, the input resampled by a model.
+    """Matches chips of a masked pair by one joint histogram, the input resampled by a model.
 
-    The masked image's chips are the templates: the other image has no mask of its own, and what
-    it shows beside the ground must not take part.
+    The masked image's chips are the templates. The other image has no mask of its own, and its
+    content other than ground must not take part.
 
     Parameters
     ----------
     pair
         The images; one of them has a mask.
     pooled_chip_px
-        Side of the chips, which cover the grid, that the joint histogram is counted in.
+        Side of the chips, covering the grid, from which the joint histogram is counted.
     held_out
-        Returns for a piece of a grid which pixels of the reference must not be seen.
+        Takes a piece of a grid and returns which pixels of the reference are held out.
     blind
-        Whether chips may not see what is held out; the joint histogram never counts it.
+        Whether held-out pixels are hidden from chips; the joint histogram never counts them.
     colours
-        By whose classes the image without mask is counted; None: by grey levels.
+        Colour classes by which the image without mask is counted; None: by grey levels.
     """
 
     pair: ImagePair
@@ -63,12 +63,12 @@ class PooledHistogramMatcher:
     blind: bool = True
     colours: Colours | None = None
 
-    # What the coarse shift is searched for by.
+    # The similarity measure of the coarse search.
     settings = SimilaritySettings("nmi")
 
     @classmethod
     def of(cls, pair: ImagePair, pooled_chip_px: int, held_out: MaskOf) -> PooledHistogramMatcher:
-        """Return the matcher of a masked pair, by colours where the other image has some."""
+        """Return the matcher of a masked pair, by colours if the other image has them."""
         plain = cls(pair, pooled_chip_px, held_out)
         other = getattr(pair, plain._searched)
         if not other.has_colours:
@@ -80,14 +80,14 @@ class PooledHistogramMatcher:
         return replace(plain, colours=Colours.of(np.abs(bands), valid.all(axis=0)))
 
     def seeing_all(self) -> PooledHistogramMatcher:
-        """Return this matcher for check chips, which may see what is held out of the fit."""
+        """Return this matcher for check chips, which may see the blocks held out of the fit."""
         return replace(self, blind=False)
 
     def match(self, model: Model, places: Places, radius_px: int, context: Context) -> ChipSurfaces:
         """Return the surfaces of all chips that have enough ground.
 
-        They are matched one way alone, so both ways are the same. Parameters as
-        `ChipMatcher.match` has them.
+        They are matched in one direction only, so both surfaces are the same. Parameters as in
+        `ChipMatcher.match`.
 
         Raises
         ------
@@ -111,14 +111,14 @@ class PooledHistogramMatcher:
         span = 2 * radius_px + 1
         nats = np.stack(found) if found else np.zeros((0, span, span), np.float32)
         normalised = normalise(nats)
-        # Chips count by their evidence, in nats; on average as much as those of other similarities.
+        # Chips are weighted by their evidence, in nats; weighted peaks average 1, as in other fits.
         spread = np.ptp(nats, axis=(1, 2)) / np.maximum(np.ptp(normalised, axis=(1, 2)), 1e-9)
         heights = normalised.max(axis=(1, 2), initial=0.0) * spread
         weight = spread / max(float(heights.mean()), 1e-9) if found else spread
         return ChipSurfaces(places.centres[kept], normalised, normalised, weight)
 
     def fit_places(self, layout: ChipLayout) -> Places:
-        """Return the chips that a fit is made of: all over the grid, as there is little in each."""
+        """Return the chips of the fit: all over the grid, as each holds little ground."""
         return Places.tiles(self.pair.grid, self.pooled_chip_px)
 
     def first_model(
@@ -129,18 +129,18 @@ class PooledHistogramMatcher:
         return lambda px: px + shift
 
     def kind_of(self, kind: str) -> str:
-        """Return the kind of model that is fitted where one is asked for."""
+        """Return the kind of model to fit when `kind` is requested."""
         return _AUTO_KIND if kind == AUTO else kind
 
     def is_settled(self, expected_px: FloatArray) -> bool:
-        """Whether matching again is in vain: never.
+        """Whether matching again cannot help: never.
 
-        The joint histogram gets the better the nearer chips lie.
+        The joint histogram improves with alignment.
         """
         return False
 
     def for_points(self, surfaces: ChipSurfaces) -> ChipSurfaces:
-        """Return the surfaces that points of the fit are taken from: sums of neighbouring chips.
+        """Return the surfaces from which tie points of the fit are taken: sums of neighbours.
 
         Little of each chip is ground. Measured by the suite rpc_city, with surface models: RPCs
         refined by single chips are off by 0.73 px (median), by such sums 0.63 px.
@@ -148,11 +148,11 @@ class PooledHistogramMatcher:
         return surfaces.with_neighbours(self.pooled_chip_px)
 
     def for_check(self, surfaces: ChipSurfaces, layout: ChipLayout) -> ChipSurfaces:
-        """Return the surfaces that check points are taken from: sums over neighbouring blocks."""
+        """Return the surfaces from which check points are taken: sums over neighbouring blocks."""
         return surfaces.summed(layout.neighbourhoods(surfaces.centres))
 
     def _histogram(self, images: Resampled, places: Places, context: Context) -> PooledHistogram:
-        """Return the evidence of pairs of grey levels in chips of the fit, as they lie now."""
+        """Return the joint histogram of the chips of the fit at their current alignment."""
         every = max(len(places.centres) * places.chip_px**2 // _MOST_PIXELS, 1)
 
         def pixels(reference: Patch, input: Patch) -> FloatImage:
@@ -171,12 +171,12 @@ class PooledHistogramMatcher:
 
     @property
     def _searched(self) -> str:
-        """Which image has no mask, or none that chips are cut by."""
+        """Name of the image that is searched: its mask, if any, does not cut chips."""
         return "input" if self._is_reference_masked else "reference"
 
     @property
     def _coloured(self) -> ImagePair:
-        """The pair, with classes of colour where they are counted."""
+        """The pair, with colour classes if they are counted."""
         if self.colours is None:
             return self.pair
         other = replace(getattr(self.pair, self._searched), colours=self.colours)

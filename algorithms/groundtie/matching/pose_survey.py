@@ -1,8 +1,9 @@
-"""Chips all over a pair that confirm a pose, or show what it does not hold for.
+"""Chips all over a pair that confirm a pose, or show parts for which it does not hold.
 
-A pose is a start, good to a hundredth or two of the image. So its chips are larger than those that
-survey a registration, a pose is first moved to where they agree, and each chip is compared with a
-pose that was moved without it. Parts that lie elsewhere are looked for with smaller chips, too.
+A pose is a first estimate, accurate to a hundredth or two of the image. So its chips are larger
+than those that survey a registration. The pose is first refined by the chips, and each chip is
+compared with a pose refined without it. Parts that lie elsewhere are also sought with smaller
+chips.
 """
 
 from __future__ import annotations
@@ -30,41 +31,41 @@ from .shared_content import Sensors
 from .survey import SURVEY_RADIUS_PX, survey_model, survey_places
 from .surveys import Surveys, survey_all
 
-# Chips along the shorter side. Of the 29 shared rotated pairs, at their poses: four are too few to
-# show parts, six so small that radar hardly matches.
+# Chips along the shorter side. With the 29 shared rotated pairs at their poses, four chips are too
+# few to show parts, and six are so small that radar images hardly match.
 _ALONG = 5
 
 # A chip agrees with a pose within this: 2 % of the smallest images that poses are asked for.
 POSE_TOLERANCE_PX = 5.0
 
-# Poses of what is drawn into both arrays lie within this of whole pixels all over, those of ground
-# that no grid of pixels was cut by no nearer than 0.24 (suite attacks).
+# Poses of content drawn into both arrays lie within this of whole pixels everywhere. Those of
+# ground that was not cut along a pixel grid lie no nearer than 0.24 (suite attacks).
 _EXACT_PX = 0.2
 
-# Fewer chips than this hold no similarity transform, whose four parameters need two.
+# Fewest chips of a similarity transform, whose four parameters need two.
 _FEWEST = 4
 
 
 @dataclass(frozen=True)
 class PoseSurvey:
-    """What chips all over a pair show of a pose.
+    """Survey of a pose by chips all over a pair.
 
     Parameters
     ----------
     grid
-        What the chips lie on.
+        The grid of the chips.
     px
-        Their centres, in its pixels, shape (n, 2).
+        The chips' centres, in pixels of the grid, shape (n, 2).
     residuals_px
-        Where each chip matches, (x, y) from where a pose has it that was moved without the chip,
+        Offset (x, y) of each chip's match from the prediction of a pose refined without the chip,
         shape (n, 2); infinite where too few chips are left.
     surveys
-        What they show of the pose that was moved by all of them.
+        Surveys of the pose that was refined by all chips.
     transform
-        The pose that was moved by all of them.
+        The pose that was refined by all chips.
     fold_models
-        The pose moved without one block of chips after the other, between pixels of that grid;
-        none where too few chips are left.
+        The pose refined without each block of chips in turn, between pixels of the grid; none where
+        too few chips are left.
     """
 
     grid: Grid
@@ -76,7 +77,7 @@ class PoseSurvey:
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
-        """Which chips agree with a pose that was moved without them, shape (n,)."""
+        """Which chips agree with a pose that was refined without them, shape (n,)."""
         return np.asarray(np.hypot(*self.residuals_px.T) <= POSE_TOLERANCE_PX)
 
 
@@ -95,13 +96,13 @@ def survey_pose(
     pair
         The images.
     transform
-        The pose, as a transform between them.
+        The pose, as a transform between the images.
     accuracy_share
-        Its accuracy, as a share of the reference's longer side.
+        Accuracy of the pose, as a share of the reference's longer side.
     sensors
-        What the images may be.
+        Kinds of sensors that the images may come from.
     open_ground
-        Returns which pixels are none, of two radar images; None: it is not known.
+        Returns which pixels of two radar images are not open ground; None: not known.
     context
         Threads and progress.
     """
@@ -128,7 +129,7 @@ def survey_pose(
 
 
 def _covered(grid: Grid, transform: Transform) -> Grid:
-    """Return the part of a grid in which a transform has the input."""
+    """Return the part of a grid that the input covers by a transform."""
     outline = transform.inverse(transform.input_grid.outline())
     px = finite(grid.map_to_pixel(outline))
     size = np.array(grid.size)
@@ -148,14 +149,14 @@ def _places(grid: Grid) -> Places:
 
 
 def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Fitted:
-    """Return the similarity transform of a grid's pixels on which chips' surfaces agree."""
-    # Every chip counts the same; none is as low as 1, but for those that show nothing.
+    """Return the similarity transform of grid pixels on which the chips' surfaces agree."""
+    # Every chip counts the same; only chips without content are lower than 1.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
     return align(["similarity"], px, equal, IDENTITY, np.copy)
 
 
 def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:
-    """Return where each chip matches, from where every other chip, as on a chessboard, has it."""
+    """Return the residuals of chips from a model fitted to the chessboard's other colour."""
     is_black = (px // pitch_px).sum(axis=1) % 2 == 0
     residuals = np.full((len(px), 2), np.inf)
     if min(is_black.sum(), (~is_black).sum()) < _FEWEST:

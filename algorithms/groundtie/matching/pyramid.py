@@ -1,4 +1,4 @@
-"""Down the image pyramid: from the coarse shift to a model that tie points can start from."""
+"""Descent of the image pyramid: from the coarse shift to a model from which tie points start."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .pooled import PooledHistogramMatcher
 from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
 
-# A candidate that random matches would hardly ever support (log10) needs no rival.
+# With expected false alarms (log10) below this, a candidate is certain: others that are too low to
+# be rivals are not tried.
 _CERTAIN = -6.0
 
-# Repetitive places match more than once. A candidate nearly as high as the best is looked at, and
+# Repetitive scenes match at several places. A candidate nearly as high as the best is tried, and
 # is a rival if chips support it with at least half the evidence (log10).
 _RIVAL_EVIDENCE = 0.5
 _SAME_PLACE_PX = 5.0
 
-# Above so many expected false alarms (log10) nothing was found. Local matches may still
-# succeed where large chips failed, and the verdict checks what comes of them.
+# Above this number of expected false alarms (log10), nothing was found. Local matches may still
+# succeed where large chips failed, and the verdict checks their result.
 _HOPELESS = 0.0
 
-# How far chips are searched around a candidate, in pixels of the level.
+# Search radius of chips around a candidate, in pixels of the level.
 _RADIUS_PX = 12
 
-# As far as a level's model may be wrong, in its own pixels, and the distortion that it does not
-# model, in those of the level that is searched.
+# Largest error of a level's model, in pixels of that level, and the distortion that it leaves
+# unmodelled, in pixels of the level that is searched.
 _LEVEL_ERROR_PX, _DISTORTION_PX = 2.0, 4
 
-# Each level is finer than the one before by this at most.
+# Largest ratio of pixel sizes between successive levels.
 _STEP = 4.0
 
-# Masked chips have too little evidence to look so far: levels are this much finer.
+# The ratio for masked chips, which have too little evidence for the larger search radius.
 _POOLED_STEP = 2.0
 
 
@@ -50,8 +51,8 @@ def find_coarse_model(matcher: SurfaceMatcher, context: Context) -> Model:
     Parameters
     ----------
     matcher
-        What tie points are matched by; it sees nothing of what is held out. Its pair holds how far
-        the input may lie from its nominal place.
+        Matches tie points, without the held-out blocks. Its pair holds the limits on how far the
+        input may lie from its nominal place.
     context
         Threads and progress.
 
@@ -81,7 +82,7 @@ def _descend(
     factor: float,
     context: Context,
 ) -> Model:
-    """Return the model that chips agree on, level by level; the coarsest has its own matcher."""
+    """Refine the model that chips agree on, level by level; the coarsest has its own matcher."""
     grid, quiet = matcher.pair.grid, context.quiet()
     level = grid.scaled(factor)
     tried: list[CoarseModel] = []
@@ -107,7 +108,7 @@ def _descend(
 def _descend_pooled(
     matcher: PooledHistogramMatcher, candidates: list[Candidate], factor: float, context: Context
 ) -> Model:
-    """Return the model that the ground as a whole agrees on, level by level."""
+    """Refine the model that the ground as a whole agrees on, level by level."""
     if not candidates:
         raise NothingFoundError("nothing in common was found")
     best, *others = candidates
@@ -122,12 +123,12 @@ def _descend_pooled(
 
 
 def _reach_px(factor: float) -> int:
-    """Return how far to search around a model of a level so many times coarser, in pixels."""
+    """Return the search radius, in pixels, around the model of a level `factor` times coarser."""
     return int(np.ceil(_LEVEL_ERROR_PX * factor)) + _DISTORTION_PX
 
 
 def _reaches_tie_points(factor: float) -> bool:
-    """Whether tie points are searched as far as the model of a level may be wrong."""
+    """Whether the search for tie points covers the error of a level's model."""
     return _reach_px(factor) <= FIT_RADIUS_PX
 
 

@@ -1,4 +1,4 @@
-"""What two images have the same, and what it may be: ground, a copy, or something drawn."""
+"""Identical content of two images, and its likely origin: ground, a copy, or drawn content."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..similarity.in_common import Sameness
 
 
 class Sensors(Enum):
-    """What sensors the images may be of."""
+    """Kinds of sensors that the images may come from."""
 
     CAMERAS = "cameras"
     RADARS = "radars"
@@ -18,20 +18,21 @@ class Sensors(Enum):
 
 @dataclass(frozen=True)
 class SharedContent:
-    """What images have the same where a transform has them, and what it may be.
+    """Identical content of two images aligned by a transform, and its likely origin.
 
     Parameters
     ----------
     sameness
-        How much.
+        Measures of how much is identical.
     sensors
-        What the images may be.
+        Kinds of sensors that the images may come from.
     is_whole
-        Whether the transform moves the array by whole pixels all over, whatever is nominal, as far
-        as that is known: speckle moves what is drawn over two radars' images off whole pixels.
+        Whether the transform shifts the array by whole pixels everywhere, within its accuracy and
+        whatever the nominal geotransform. Speckle moves an overlay in two radar images off whole
+        pixels.
     off_drawn
-        How far the transform is from those that move what is drawn: by whole pixels of the array,
-        or hardly at all on the map. Up to 1, it may be one of them.
+        Distance of the transform from those that drawn content follows: shifts by whole pixels of
+        the array, or hardly any shift on the map. Up to 1, it may be one of them.
     """
 
     sameness: Sameness
@@ -41,20 +42,20 @@ class SharedContent:
 
     @property
     def is_exact(self) -> bool:
-        """Whether it lies too exactly on whole pixels for ground.
+        """Whether the content lies too exactly on whole pixels for ground.
 
-        Radar images of one ground vary alike where speckle has averaged out: those that do, do not
-        count as exact.
+        Radar images of the same ground vary alike where speckle has averaged out, so images that
+        do so never count as exact.
         """
         is_ground = self.sensors is Sensors.RADARS and self.sameness.varies_as_ground
         return self.is_whole and not is_ground
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is the same than two views show of one ground, or lies too exactly so.
+        """Whether more is identical than in two views of the same ground, or `is_exact`.
 
-        Two radar images of one ground vary alike where speckle has averaged out, as in pixels of
-        many looks.
+        Two radar images of the same ground vary alike where speckle has averaged out, as in pixels
+        of many looks.
         """
         same, are_moved = self.sameness, self.sensors is Sensors.RADARS and self.moves_as_ground
         is_ground = are_moved and same.has_one_ground and not same.covers_most
@@ -62,28 +63,28 @@ class SharedContent:
 
     @property
     def is_of_cameras(self) -> bool:
-        """Whether none of the images is a radar's, as far as what they share shows it.
+        """Whether, judging by the shared content, neither image is a radar image.
 
-        A radar's and a camera's are hardly alike in coarse pixels, speckle or not.
+        Radar and camera images are hardly alike in coarse pixels, with or without speckle.
         """
         return self.sensors is Sensors.CAMERAS and self.sameness.is_of_one_sensor
 
     @property
     def moves_as_ground(self) -> bool:
-        """Whether the transform moves the image as nothing drawn is moved."""
+        """Whether the transform moves the image in a way that drawn content is never moved."""
         return self.off_drawn > 1
 
     @property
     def may_be_drawn(self) -> bool:
-        """Whether what is the same may be all that matches, though no more than of one ground."""
+        """Whether identical content may be all that matches, even if no more than ground shows."""
         return self.sameness.covers_some and not self.is_explained
 
     @property
     def is_explained(self) -> bool:
-        """Whether the images are copies, or one camera's views of one ground.
+        """Whether the images are copies, or views of the same ground by one camera.
 
-        What is left of them need not confirm the transform: copies leave nothing, and what a camera
-        shows alike is most of what it shows. Each view of a radar has speckle of its own.
+        Then the remaining content need not confirm the transform: copies leave none, and most of
+        what one camera shows is alike. Radar views are no such case: each has its own speckle.
         """
         if self.sensors is Sensors.DIFFERENT:
             return False
@@ -92,20 +93,21 @@ class SharedContent:
 
     @property
     def is_moved_view(self) -> bool:
-        """Whether cameras' images are views of one ground by where they lie, and no copies."""
+        """Whether the transform shows that camera images are views of the ground, not copies."""
         are_views = self.sensors is Sensors.CAMERAS and not self.sameness.is_copy
         return are_views and self.moves_as_ground and self.sameness.leaves_ground
 
     @property
     def may_hide_ground(self) -> bool:
-        """Whether what is explained may be drawn all the same, by its edges and place."""
+        """Whether explained content may still be drawn, judging by its edges and position."""
         return self.sameness.has_sharp_edges and not self.is_moved_view
 
     @property
     def is_drawn(self) -> bool:
-        """Whether its edges are not those of one ground.
+        """Whether the edges cannot be those of the same ground.
 
-        They lie beside one another; or they are sharper, of what is no copy or view.
+        Either they lie beside one another, or they coincide too sharply in images that are neither
+        copies nor views.
         """
         same = self.sameness
         is_image = self.is_explained or same.is_copy_in_other_colours

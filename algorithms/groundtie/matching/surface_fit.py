@@ -1,4 +1,4 @@
-"""The model that the similarity surfaces of all chips agree on, and the tie points near it."""
+"""The model on which the similarity surfaces of all chips agree, and the tie points near it."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ from .pooled import PooledHistogramMatcher
 # A tie point of the fit is the peak within this distance from the aligned model.
 _NEAR_PX = 3
 
-# Largest shift of a chip of the fit from where a coarse model predicts it.
+# Largest shift of a chip of the fit from its position predicted by a coarse model.
 FIT_RADIUS_PX = 8
 
-# The matchers of chips with surfaces.
+# The matchers that return surfaces of chips.
 SurfaceMatcher: TypeAlias = ChipMatcher | PooledHistogramMatcher
 
 
@@ -47,13 +47,13 @@ class SurfaceFit:
     Parameters
     ----------
     matcher
-        Matches the chips, which see nothing of held-out blocks.
+        Matches the chips, without the held-out blocks.
     layout
-        Where chips lie in the matching grid.
+        Layout of chips in the matching grid.
     candidates
-        What "auto" chooses from, from simple to flexible.
+        Kinds of model from which "auto" chooses, from simple to flexible.
     terrain
-        Heights on the map, for the model that needs them, which is then a candidate.
+        Heights on the map, for the terrain model, which is then a candidate.
     """
 
     matcher: SurfaceMatcher
@@ -67,7 +67,7 @@ class SurfaceFit:
         Parameters
         ----------
         coarse
-            The misregistration on the map, a model of degree 1; it may be wrong by
+            The misregistration on the map, a model of degree 1; its error may be up to
             `FIT_RADIUS_PX`.
         kind
             One of `models.KINDS`, or "auto" for the simplest polynomial that the chips justify.
@@ -85,7 +85,8 @@ class SurfaceFit:
         if not is_flexible and not self.matcher.is_settled(expected):
             coarse = aligned.model.on_map(pair.grid.centre_transform)
             if aligned.model.kind == TERRAIN:
-                # Chips that were displaced by heights have lost them: they justify no more.
+                # The input is resampled without relief displacement now, so that its chips no
+                # longer justify a terrain model.
                 kind = TERRAIN
             surfaces, aligned, expected = self._align(coarse, kind, context)
         surfaces = self.matcher.for_points(surfaces)
@@ -103,7 +104,7 @@ class SurfaceFit:
     ) -> tuple[ChipSurfaces, Fitted, FloatArray]:
         """Match the chips of the fit around a model, and align a better one with their surfaces.
 
-        Returns the surfaces, the alignment and the shifts that it expects of the chips, (n, 2).
+        Returns the surfaces, the aligned model and the chips' shifts expected from it, (n, 2).
         """
         matcher = self.matcher
         places = matcher.fit_places(self.layout)
@@ -127,7 +128,7 @@ class SurfaceFit:
 
 
 def _prior_of(model: Model, grid: Grid) -> Prior:
-    """Return a model of map positions as what the input was resampled by."""
+    """Return the prior of an input resampled by a model of map positions."""
     if not isinstance(model, TerrainModel):
         return Prior.of_affine(on_grid(model, grid))
 
@@ -140,7 +141,7 @@ def _prior_of(model: Model, grid: Grid) -> Prior:
 def fit_points(
     pair: ImagePair, surfaces: ChipSurfaces, model: Model, expected_px: FloatArray
 ) -> TiePoints:
-    """Return the surfaces' peaks near expected shifts, shape (n, 2), as points of a fit."""
+    """Return the surfaces' peaks near expected shifts, shape (n, 2), as tie points of a fit."""
 
     def peaks(of: Surfaces) -> list[Peak]:
         pairs = zip(of, expected_px, strict=True)
@@ -152,7 +153,7 @@ def fit_points(
 
 
 def check_points(pair: ImagePair, surfaces: ChipSurfaces, model: Model) -> TiePoints:
-    """Return the surfaces' peaks, wherever they are, as check points."""
+    """Return the highest peaks of the surfaces, wherever they lie, as check points."""
 
     def peaks(of: Surfaces) -> list[Peak]:
         return [find_peak(surface) for surface in of]
@@ -187,7 +188,7 @@ def _tie_points(
 
 
 def _without_outliers(points: TiePoints, transform: Transform, pair: ImagePair) -> TiePoints:
-    """Reject the points of the fit that more likely fell by chance than near the model."""
+    """Reject the points of the fit that are more likely random outliers than inliers."""
     used = points.used
     residuals = points.take(used).residual_on(pair.grid, transform)
     mixture = fit_mixture(residuals, (2 * _NEAR_PX + 1) ** 2)

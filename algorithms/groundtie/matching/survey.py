@@ -1,4 +1,4 @@
-"""Chips all over a pair, matched around a model: what confirms it, and what lies elsewhere."""
+"""Chips all over a pair, matched around a model: those that confirm it, and parts elsewhere."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .matcher import MaskOf, Places
 from .parts import ELSEWHERE_PX, MOST_OF_ONE, Part, find_parts
 
-# Chips lie side by side: so many along the shorter side of the grid if their sides allow it, and no
-# more than so many along any.
+# Range of the chips' side, number of chips side by side along the grid's shorter side if that range
+# allows it, and the most along any side.
 _CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 
-# How far off a part may lie.
+# Largest shift of a part.
 SURVEY_RADIUS_PX = 24
 
-# A peak is higher than all around it that counts as the same place.
+# A peak is the highest value in the neighbourhood that counts as one place.
 _NEIGHBOURS = np.ones((2 * int(TOLERANCE_PX) + 1,) * 2, np.uint8)
 
 
 @dataclass(frozen=True)
 class Survey:
-    """Where chips all over a grid match, relative to where a model has them.
+    """Matches of chips all over a grid, relative to their positions predicted by a model.
 
     Parameters
     ----------
@@ -45,12 +45,12 @@ class Survey:
     centres
         Pixel positions (col, row) of the chips, shape (n, 2).
     shifts_px
-        Where each matches best, (x, y) from where the model has it, shape (n, 2).
+        Shift (x, y) of each chip's best match from the prediction, shape (n, 2).
     surfaces
-        Their similarity around where the model has them, in robust standard deviations of each,
-        shape (n, 2 r + 1, 2 r + 1).
+        Similarity of the chips around the prediction, in robust standard deviations of each
+        surface, shape (n, 2 r + 1, 2 r + 1).
     elsewhere_px
-        Places farther than this from where the model has all chips are second places.
+        Common shifts of all chips beyond this distance are second places.
     """
 
     grid: Grid
@@ -66,39 +66,39 @@ class Survey:
 
     @property
     def is_confirming_chip(self) -> NDArray[np.bool_]:
-        """Which chips match where the model has them, shape (n,)."""
+        """Which chips match where the model predicts them, shape (n,)."""
         return np.asarray(np.hypot(*self.shifts_px.T) <= TOLERANCE_PX)
 
     @property
     def confirming(self) -> int:
-        """How many chips match where the model has them."""
+        """Number of chips that match where the model predicts them."""
         return int(self.is_confirming_chip.sum())
 
     @property
     def comparable(self) -> int:
-        """How many chips overlap with the input where the model has them: surfaces are 0 else."""
+        """Number of chips that overlap the input where predicted; others have surfaces of 0."""
         near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
         return int((near != 0).any(axis=1).sum())
 
     @property
     def height(self) -> float:
-        """How high the chips' similarity is on average where the model has them."""
+        """Mean similarity of the chips where the model predicts them, at its maximum."""
         return float(self.mean[self._distance_px <= TOLERANCE_PX].max())
 
     @property
     def rival_height(self) -> float:
-        """How high it is where all of them are moved elsewhere, at the best such place."""
+        """Mean similarity of the chips at the best common shift elsewhere."""
         return float(self.mean[self._is_far].max())
 
     @property
     def second_peak(self) -> float:
-        """How high many chips are at the highest peak elsewhere; 0: there is none.
+        """Mean similarity of many chips at the highest peak elsewhere; 0: there is no peak.
 
-        Ground that lies elsewhere has one; what is similar because it lies near has none.
+        Ground that lies elsewhere has a peak; the flank of the first place has none.
         """
         mean, of_many = self.mean, self._mean_of_many
-        # A peak of both: cut off, a wide one is a plateau, whose rim is as high as its middle; and
-        # what few chips are highest at may be the flank of the first place to many.
+        # It must be a peak of both means. A wide peak that is cut off is a plateau, as high at its
+        # rim as in its middle; and a peak of few chips may be on the flank of the first place.
         is_peak = (mean == cv2.dilate(mean, _NEIGHBOURS)) & (
             of_many == cv2.dilate(of_many, _NEIGHBOURS)
         )
@@ -108,24 +108,24 @@ class Survey:
     def deviation_elsewhere(self) -> float:
         """The robust standard deviation of the mean similarity of many chips elsewhere.
 
-        It is no less than that of a mean of as many independent chips: where little overlaps, most
-        of it is 0.
+        It is at least that of a mean of as many independent chips: where little overlaps, most
+        values are 0, and would make it too small.
         """
         of_noise = max(len(self.surfaces), 1) ** -0.5
         return max(robust_deviation(self._mean_of_many[self._is_far]), of_noise)
 
     @cached_property
     def _mean_of_many(self) -> Surface:
-        """As `mean`, but of surfaces cut off where a chip would count for more than one may.
+        """As `mean`, but of surfaces cut off at the largest contribution of one chip.
 
-        So a few canopies that are displaced are no peak of the whole.
+        So a few displaced canopies make no peak of the whole.
         """
         total = np.minimum(self.surfaces, MOST_OF_ONE).sum(axis=0)
         return np.asarray(total / max(len(self.surfaces), 1))
 
     @property
     def _is_far(self) -> NDArray[np.bool_]:
-        """At which shifts second places lie, shape (2 r + 1, 2 r + 1)."""
+        """Mask of the shifts that count as second places, shape (2 r + 1, 2 r + 1)."""
         return np.asarray(self._distance_px > self.elsewhere_px)
 
     @property
@@ -135,7 +135,7 @@ class Survey:
 
     @cached_property
     def parts(self) -> Sequence[Part]:
-        """Chips that together match elsewhere, the most evident first."""
+        """Groups of chips that together match elsewhere, the most evident first."""
         return list(find_parts(self.grid, self.centres, self.surfaces))
 
 
@@ -154,12 +154,12 @@ def survey_model(
     without: MaskOf | None = None,
     images: Resampled | None = None,
 ) -> Survey:
-    """Match chips all over a pair around what a model on the map predicts.
+    """Match chips all over a pair around their positions predicted by a model on the map.
 
     Parameters
     ----------
     matcher
-        What the chips are matched by.
+        Matches the chips.
     model
         The model.
     places
@@ -169,9 +169,10 @@ def survey_model(
     context
         Threads and progress.
     without
-        Returns for a piece of the grid which pixels of the reference are left out; None: none.
+        Takes a piece of the grid and returns which pixels of the reference are left out; None:
+        none.
     images
-        The pair's, resampled by the model with the radius and more around them; None: they are
+        The pair's, resampled by the model with a margin of at least the radius; None: they are
         resampled here.
     """
     least = None if without is None else LEAST_VALID_MASKED

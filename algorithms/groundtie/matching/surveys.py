@@ -1,4 +1,4 @@
-"""All that the rules ask of chips all over a pair: as it is, and without what may deceive."""
+"""All surveys of a pair that the rules need: of its full content, and without deceptive parts."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from .phase_survey import PHASES_REACH_PX, survey_unexplained
 from .shared_content import Sensors, SharedContent
 from .survey import Survey, survey_model, survey_places
 
-# Of images that are no two radars' or one camera's, windows that vary alike, and edges that
-# coincide, are little of what matches. Without the ones or the others, right transforms leave 1.1
-# and more (suite real), what is drawn over other ground mostly up to 0.8.
+# In images that are not of two radars or one camera, windows that vary alike and edges that
+# coincide are a small part of what matches. Without one or the other, correct transforms leave 1.1
+# and more (suite real), drawn content over different ground mostly up to 0.8.
 LEAST_OF_REST = 1.0
 
 
 @dataclass(frozen=True)
 class Rest:
-    """What chips show without content that is the same in both arrays.
+    """The survey without the content that is identical in both arrays.
 
     Parameters
     ----------
     shared
-        That content, however little.
+        The identical content, however little.
     chips
-        How many chips there are; of some too little may be left.
+        Number of chips, including those of which too little may be left.
     survey
-        What they show; None: it is not asked, as of hardly any such content, of what is drawn, and
-        of copies and views that hide nothing.
+        The survey; None: not made, as there is hardly any such content, or its edges show that it
+        is drawn, or the images are copies or views that hide nothing.
     without_edges
-        What they show without the surroundings of edges that coincide, where no such content is
-        evident and hardly anything is left of other images than two radars'; None elsewhere.
+        The survey without the surroundings of coinciding edges. It is made where no identical
+        content is evident and hardly anything is left, unless both are radar images; else None.
     """
 
     shared: SharedContent
@@ -49,20 +49,20 @@ class Rest:
 
 @dataclass(frozen=True)
 class Surveys:
-    """What chips all over a pair show of a transform.
+    """Surveys of a transform by chips all over a pair.
 
     Parameters
     ----------
     whole
-        Of all that takes part; None: they were not asked, nor are the others then.
+        Of all content that takes part; None: no surveys were made at all.
     rest
-        Without content that is the same in both arrays; None: none is looked for.
+        Without the content that is identical in both arrays; None: it is not looked for.
     ground
-        Of open ground; None: the images are not two radars', or it alone takes part.
+        Of open ground; None: not both are radar images, or open ground alone takes part.
     fine
-        Of smaller chips, which show smaller parts; None: the others are as small.
+        With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
-        Of what the reference does not explain of the input; None: one image is rendered.
+        Of the part of the input that the reference does not explain; None: one image is rendered.
     """
 
     whole: Survey | None = None
@@ -73,7 +73,7 @@ class Surveys:
 
     @property
     def parts(self) -> Sequence[Part]:
-        """Chips that together match elsewhere, the most evident first."""
+        """Groups of chips that together match elsewhere, the most evident first."""
         found = [part for one in (self.whole, self.fine) if one is not None for part in one.parts]
         return sorted(found, key=lambda part: part.excess, reverse=True)
 
@@ -92,23 +92,24 @@ def survey_all(
     Parameters
     ----------
     matcher
-        What the chips are matched by.
+        Matches the chips.
     transform
-        What was found.
+        The transform that was found.
     places
         The chips, on a regular layout.
     accuracy_px
-        Farther than the first from where the transform has all chips lies a second place; within
-        the second of whole pixels, it moves the array by these.
+        Two limits. A match of all chips farther than the first from the transform's prediction is
+        a second place. A transform within the second of whole pixels shifts the array by them.
     sensors
-        What the images may be; None: one is rendered from heights, and shows nothing drawn.
+        Kinds of sensors that the images may come from; None: one is rendered from heights, and
+        has no drawn content.
     open_ground
-        Returns which pixels are none, of two radar images; None: it is not asked for.
+        Returns which pixels of two radar images are not open ground; None: no survey of it.
     context
         Threads and progress.
     """
     pair, model, elsewhere_px = matcher.pair, transform.model, accuracy_px[0]
-    # Once for all; chips may end a pixel beyond the grid.
+    # Resampled once for all surveys; chips may extend a pixel beyond the grid.
     images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX + 1, context)
     part = context.part(0.0, 0.4)
     whole = survey_model(matcher, model, places, elsewhere_px, part, images=images)
@@ -132,15 +133,15 @@ def survey_rest(
     images: Resampled,
     context: Context,
 ) -> Rest | None:
-    """Return what chips show without content that is the same in both arrays.
+    """Survey a pair without the content that is identical in both arrays.
 
     Parameters as `survey_all`, and the images resampled by the transform.
 
     Returns
     -------
-    None where no such content is looked for. Chips are not asked where there is hardly any of it,
-    unless both images are a radar's: speckle blurs it; and where the images are one camera's views,
-    which have no more of it than these.
+    The result; None where no such content is looked for. It has no survey where there is hardly
+    any identical content, unless both are radar images, in which speckle blurs it; nor where the
+    content is drawn; nor where the images are copies or views that hide nothing.
     """
     pair, asked = matcher.pair, survey_places(matcher.pair.grid)
     elsewhere_px, exact_px = accuracy_px
@@ -152,9 +153,9 @@ def survey_rest(
     are_radars = sensors is Sensors.RADARS
     if not (shared.is_evident or shared.may_be_drawn or are_radars):
         return Rest(shared, chips)
-    # What a mask leaves is little: one measure alone would miss most of it.
+    # A mask leaves little content, most of which a single measure would miss.
     fused = replace(matcher, settings=SimilaritySettings())
-    # Another input leaves something else of the reference.
+    # The mask of the reference depends on the input, so descriptions cannot be reused.
     once = replace(context, memo=None)
 
     def left_without(mask: MaskOf) -> Survey:
