@@ -36,7 +36,7 @@ _GROUND_CELL_M = 4.0
 # Placeholder above all heights on Earth.
 _NOWHERE_M = np.float32(1e5)
 
-# Heights are summed as whole numbers of this step, so that sums do not depend on their order.
+# Heights are summed as whole numbers of this step, so that running sums leave no rounding behind.
 _STEP_M = 1 / 1024
 
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")

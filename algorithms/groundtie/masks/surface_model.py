@@ -33,7 +33,7 @@ _SHADOW = np.float32(0.1)
 # double bounce, the error of the registration is 1.5 times as large; more echoes gain little.
 DOUBLE_BOUNCE = 3.0
 
-# Borders are exact to a pixel, of the model and of the rays.
+# Borders between pixels of the model and of rays are accurate to one pixel.
 _GROWN_PX = 1
 
 

@@ -61,8 +61,8 @@ _LEAST_PART = 0.05
 # which is left to the rules on a second place. Less than a tenth of the area is no evidence.
 # The same share may be related in other colours: 24 % of a noisy negative (tests/test_steps.py),
 # up to 1 % of content drawn over two radar images of different ground. The further reduction is one
-# octave: it raises the share to 1.04 times and more in right radar pairs, and to less in noise that
-# is smooth along some pixels (suite attacks).
+# octave. After it, the share is at least 1.04 times as large in right radar pairs, and smaller in
+# noise that is smooth along some pixels (suite attacks).
 #
 # Light and seasons differ over wide areas. Two dates of one camera share at least 0.96 times as
 # much in coarse pixels as in finer ones (suite sharpness); noise patterns that are smooth along up
@@ -72,10 +72,10 @@ _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
-# A smaller share is evidence of one ground if the transform places the common content as no drawn
-# content lies. 10 of 12 right transforms exceed this limit; the one wrong transform has 13 % (suite
-# margins, --seeds 87000-87029 --sample 120). Clouds, snow and waters that are inserted into both
-# images in this way reach as much as ground.
+# A smaller share is evidence of one ground if the transform moves the common content as no drawn
+# content is moved. 10 of 12 right transforms exceed this limit; the one wrong transform has 13 %
+# (suite margins, --seeds 87000-87029 --sample 120). Clouds, snow and waters that are inserted into
+# both images with such a transform reach as much as ground.
 MOVED_GROUND_SHARE = 0.15
 
 # Least valid share of the pixels that a pixel of a reduced image averages.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from .surface import Surface
 
-# Gaussian blur: interpolation leaves no phases at finer detail, and without these frequencies a
-# shift by half a pixel has a single peak, too.
+# Because of interpolation, phases agree only down to detail of this size. Without the higher
+# frequencies, a shift by half a pixel has a single peak, too.
 _BLUR_PX = 0.7
 
 Spectra = NDArray[np.complex64]

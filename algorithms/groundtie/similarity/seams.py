@@ -52,7 +52,7 @@ def step_products(reference: Patch, input: Patch) -> NDArray[np.float64]:
 def step_width(products: NDArray[np.floating]) -> float:
     """Return the width of the steps that two arrays have in common; infinite if they have none.
 
-    The width is the product of steps one column or row beside the best lag over that at the best
+    The width is the sum of products one column or row beside the best lag over that at the best
     lag, both beyond chance. It is an upper limit, exceeded by chance with 5 %.
 
     Parameters

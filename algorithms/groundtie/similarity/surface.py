@@ -25,7 +25,7 @@ Surface = NDArray[np.float32]
 Known = NDArray[np.bool_]
 
 # Measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
-# docs/measurements.md has the figures of these and of other weights.
+# docs/measurements.md has the figures of these and of other choices.
 _FUSED = "fused"
 _WEIGHTS = {"nmi": 0.75, "orientation": 1.0, "edge-strength": 0.75}
 
