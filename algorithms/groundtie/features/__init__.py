@@ -1,1 +1,1 @@
-"""Features: points that are found again, what is around them, and which belong together."""
+"""Features: keypoints, their descriptors, and matches between them."""

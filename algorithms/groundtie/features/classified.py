@@ -1,4 +1,4 @@
-"""What of an image a classifier lets take part, decided at every so many of its pixels."""
+"""The part of an image that a classifier keeps, decided on a coarser grid of cells."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from ..rasters.reading import FloatImage, Mask, Window
 from .classifier import FeatureClassifier
 from .patch_statistics import NO_BANDS, PATCH_PX
 
-# So many pixels a side are decided together: few of those that their patches see.
+# Side of the cells whose pixels are decided together; it is small against the side of a patch.
 _CELL_PX = 8
 
 _MARGIN_PX = PATCH_PX // 2
 
-# A patch is left out if a quarter of it is to be, which it is so far beside: what is masked is
-# drawn back by this.
+# A patch is left out if a quarter of it is to be, that is, up to this distance beside content to
+# be left out. The masked area is therefore shrunk by this.
 _BACK_PX = PATCH_PX // 4
 
 
 @dataclass(frozen=True)
 class ClassifiedScene:
-    """A scene, and the classifier that decides of each cell of its grid whether it takes part.
+    """A scene, and the classifier that decides for each cell of its grid whether it takes part.
 
     Parameters
     ----------
     scene
         The image.
     bands
-        Returns all of its bands in a window of the grid, shape (bands, h, w).
+        Returns all bands in a window of the grid, shape (bands, h, w).
     classifier
-        Is asked what the patches around the cells' middles are.
+        Decides on the patches around the cells' centres.
     """
 
     scene: Scene
@@ -43,17 +43,17 @@ class ClassifiedScene:
     classifier: FeatureClassifier
 
     def select(self, window: Window) -> Selection:
-        """Return which pixels of a window take part, the same whatever the window."""
+        """Return which pixels of a window take part, independent of the window's place and size."""
         around = window.widened(_BACK_PX)
         kept, valid = self._kept(around)
-        # Nothing is drawn back from where the image ends.
+        # The mask is not shrunk at the image's border.
         masked = (~(kept & valid)).astype(np.uint8)
         core = cv2.erode(masked, np.ones((2 * _BACK_PX + 1,) * 2, np.uint8))
         inside = window.slices_in(around)
         return Selection((core == 0)[inside] & valid[inside], valid[inside])
 
     def _kept(self, window: Window) -> tuple[Mask, Mask]:
-        """Return which pixels' surroundings the classifier keeps, and which are valid."""
+        """Return the pixels whose surroundings the classifier keeps, and the valid pixels."""
         cells = window.aligned(_CELL_PX)
         across, down = cells.width // _CELL_PX, cells.height // _CELL_PX
         around = cells.widened(_MARGIN_PX)

@@ -1,6 +1,6 @@
 """A support vector machine that decides which keypoints may be matched ([Patel2017] 5.2, 5.3).
 
-It is kept as complete JSON, and needs no scikit-learn to be used.
+It is stored completely as JSON; its use does not require scikit-learn.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..rasters.reading import FloatImage
 from ..strict_json import read_json
 from .patch_statistics import BAND_RATIOS, NO_BANDS, STATISTICS, patch_statistics
 
-# Degrees of the kernels (γ x·v + 1) ^ degree; the others have none.
+# Degrees of the polynomial kernels (γ x·v + 1) ^ degree.
 DEGREE = {"polynomial": 3, "quadratic": 2}
 KERNELS = ("linear", "rbf", *DEGREE)
 OFFSET = 1.0
@@ -45,20 +45,20 @@ class FeatureClassifier:
     gamma
         Factor of the kernel.
     mean, spread
-        What is taken off the statistics, and what they are divided by, shape (k,).
+        Offset and divisor that scale the statistics, shape (k,).
     low, high
-        Range of the scaled statistics that it was trained on, shape (k,). Beyond it a polynomial
-        could go anywhere: what lies there is taken to lie at the end of the range.
+        Range of the scaled statistics in the training, shape (k,). Values beyond it, where a
+        polynomial is unbounded, are clipped to it.
     vectors
-        Support vectors, of scaled statistics, shape (n, k).
+        Support vectors of scaled statistics, shape (n, k).
     weights
-        Of the support vectors, shape (n,).
+        Weights of the support vectors, shape (n,).
     intercept
-        Is added to the weighted sum.
+        Constant that is added to the weighted sum.
     pixel_size_m
-        Pixel size of the image it was trained on.
+        Pixel size of the training image.
     bands
-        How many bands of an image it looks at; 0: at its grey values alone.
+        Number of an image's bands that it uses; 0: its grey values alone.
     """
 
     statistics: str
@@ -75,7 +75,7 @@ class FeatureClassifier:
     bands: int = 0
 
     def decide(self, statistics: FloatArray) -> FloatArray:
-        """Return for statistics, shape (m, k), values that are positive for what is kept, (m,)."""
+        """Return decision values, (m,), for statistics, (m, k); positive: kept."""
         scaled = np.clip((statistics - self.mean) / self.spread, self.low, self.high)
         found = np.empty(len(scaled))
         step = max(AT_ONCE // len(self.vectors), 1)
@@ -92,7 +92,7 @@ class FeatureClassifier:
         Parameters
         ----------
         window, px, bands
-            As `patch_statistics` takes them.
+            As in `patch_statistics`.
         """
         return np.asarray(self.decide(patch_statistics(self.statistics, window, px, bands)) > 0)
 
@@ -117,7 +117,7 @@ def read_classifier(path: Path) -> FeatureClassifier:
     Raises
     ------
     ParameterError
-        The file is none, or cannot be read.
+        The file is no classifier, or cannot be read.
     """
     try:
         return _from_json(read_json(path))

@@ -13,13 +13,14 @@ from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray
 from .classifier import DEGREE, OFFSET, FeatureClassifier
 
-# Fewer labelled points of a class than this carry no information.
+# Fewer labelled points of a class are not informative.
 FEWEST_POINTS = 10
 
-# More of a class make training longer, not better.
+# More points of a class make training longer, not better.
 _MOST_POINTS = 2000
 
-# Labelled points are divided into so many blocks a side, which are left out one fold at a time.
+# Blocks a side into which labelled points are divided, and folds of blocks that are left out in
+# turn.
 _BLOCKS, _FOLDS = 6, 3
 
 
@@ -30,13 +31,13 @@ class Training(Rows):
     Parameters
     ----------
     statistics
-        Of the patches around them, shape (n, k).
+        Statistics of the patches around the points, shape (n, k).
     kept
-        Which may be matched, shape (n,).
+        Whether the points may be matched, shape (n,).
     px
-        Where they lie (col, row), shape (n, 2).
+        Positions (col, row), shape (n, 2).
     bands
-        How many bands the statistics look at; 0: at grey values alone.
+        Number of bands that the statistics use; 0: grey values alone.
     """
 
     statistics: FloatArray
@@ -62,10 +63,10 @@ def train_classifier(
     statistics, kernel, pixel_size_m
         See `FeatureClassifier`.
     seed
-        Of the choice of points where there are more than are needed.
+        Random seed for the choice of points, if there are more than are needed.
     balanced
-        Whether both classes count alike, however many points they have; else each counts by how
-        common it is, as it will be met.
+        Whether both classes have equal weight, whatever their numbers of points; else each is
+        weighted by its frequency, as in use.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def train_classifier(
     weights = {
         kept: (labelled.kept == kept).sum() / (chosen.kept == kept).sum() for kept in (True, False)
     }
-    # How much a point on the wrong side costs, C, is 1 by default.
+    # C, the cost of a point on the wrong side, has its default 1.
     machine = SVC(
         kernel="poly" if kernel in DEGREE else kernel,
         degree=DEGREE.get(kernel, 1),
@@ -111,7 +112,7 @@ def train_classifier(
 def left_out_accuracy(
     labelled: Training, statistics: str, kernel: str, seed: int, balanced: bool = False
 ) -> float:
-    """Return the mean share of both classes that classifiers decide right which have not seen them.
+    """Return the cross-validated accuracy, the mean of the shares of both classes decided right.
 
     Blocks of neighbouring points are left out of the training together; NaN if the points of a
     class lie too near each other for that.
@@ -144,7 +145,7 @@ def _require_both(labelled: Training) -> None:
 
 
 def _some_of_each(kept: NDArray[np.bool_], seed: int) -> NDArray[np.intp]:
-    """Return which points to train with: all, or so many of each class, in their order."""
+    """Return the points to train with, in their order: at most `_MOST_POINTS` of each class."""
     random = np.random.default_rng(seed)
     chosen = []
     for label in (True, False):

@@ -1,8 +1,8 @@
-"""SIFT's descriptor on any gradient: what is around a keypoint, as 128 numbers.
+"""SIFT's descriptor on any gradient: 128 numbers for the surroundings of a keypoint.
 
-Gradients around a keypoint are sampled at places that rotate and grow with it, so where a
-sample lies in the descriptor is the same for all keypoints: its share in the 4 × 4 cells is one
-constant matrix, and all keypoints are described by one product. [Lowe2004]; [Suri2010] appendix.
+Gradients around a keypoint are sampled at positions that rotate and scale with it. The shares of
+the samples in the 4 × 4 cells are therefore one constant matrix for all keypoints, which are
+described by one product. [Lowe2004]; [Suri2010] appendix.
 """
 
 from __future__ import annotations
@@ -20,28 +20,29 @@ from .keypoints import Keypoints
 from .sampling import sampled_gradient, square_samples, unit_rows
 from .scale_space import Gradient, gradients_at_scales
 
-# Cells a side, and directions of each ([Lowe2004] 6.1).
+# Cells a side, and directions in each cell ([Lowe2004] 6.1).
 CELLS = 4
 DIRECTIONS = 8
 LENGTH = CELLS * CELLS * DIRECTIONS
 
-# Side of a cell, and width of the Gaussian window in cells: half the descriptor's ([Lowe2004] 6.1).
+# Side of a cell in scales. Width of the Gaussian window in cells: half the descriptor's side
+# ([Lowe2004] 6.1).
 _CELL_SCALES = 3.0
 _WINDOW_CELLS = CELLS / 2
 
-# Samples along a cell's side: they lie closer than a scale, by which the image is blurred.
+# Samples along a cell's side: they lie closer than a scale, the blur of the image.
 _SAMPLES = 4
 
-# The longest a component may be before the descriptor is normalised again ([Lowe2004] 6.1).
+# Limit of a component before the descriptor is normalised again ([Lowe2004] 6.1).
 _LARGEST_COMPONENT = 0.2
 
 
 @dataclass(frozen=True)
 class SiftDescriptor:
-    """How keypoints are described: all keep the image's axes."""
+    """SIFT's descriptor without assigning orientations: upright keypoints keep the image's axes."""
 
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
-        """Return the n keypoints and what is around them.
+        """Return the n keypoints and their descriptors.
 
         Parameters
         ----------
@@ -65,7 +66,7 @@ class SiftDescriptor:
 
 @cache
 def _cell_weights() -> tuple[FloatArray, FloatImage]:
-    """Return the places of samples in scales, and each sample's share in the cells, (16, m)."""
+    """Return the positions of m samples, in scales, and their shares in the cells, (16, m)."""
     # Cells share their samples with their neighbours, so samples reach half a cell further.
     half = (CELLS + 1) / 2
     samples = square_samples(half, _SAMPLES * (CELLS + 1))
@@ -77,7 +78,7 @@ def _cell_weights() -> tuple[FloatArray, FloatImage]:
 
 
 def sift_rows(fields: Gradient, points: Keypoints) -> FloatImage:
-    """Return the descriptors of keypoints in pixels of a gradient, shape (n, 128)."""
+    """Return the descriptors of keypoints, given in a gradient's pixels, shape (n, 128)."""
     samples, weights = _cell_weights()
     strength, direction = sampled_gradient(fields, points, samples)
     place = direction * np.float32(DIRECTIONS / (2 * np.pi))

@@ -2,10 +2,9 @@
 
 The first octave of SIFT's scale space, on the image at twice its size, holds most keypoints of a
 SAR image, and most of them are speckle. SIFT-OCT leaves this octave out. OpenCV's SIFT always
-begins on an image twice as large as the one that it is given, so it gets one of half the size,
-blurred as the scale space demands: its first octave is then the image's second. Nothing is found
-to be dropped, and the image is reduced before anything else: means of amplitudes have less speckle
-to compress.
+doubles its image, so it is given one of half the size, blurred as the scale space requires: its
+first octave is then the image's second. No keypoints need to be dropped afterwards. The image is
+reduced before the grey values are compressed, because means of amplitudes have less speckle.
 """
 
 from __future__ import annotations
@@ -27,19 +26,19 @@ ByteImage = NDArray[np.uint8]
 # Largest ratio of the principal curvatures of a keypoint ([Lowe2004] 4.1).
 _EDGE_RATIO = 10.0
 
-# OpenCV enlarges its image so that positions come out a quarter of a pixel too far.
+# OpenCV's enlargement of the image shifts positions by a quarter of a pixel.
 _OPENCV_OFFSET_PX = 0.25
 
-# The mean of two pixels blurs by this, in pixels twice as large.
+# Blur by averaging two pixels, in pixels twice as large.
 _MEAN_BLUR_PX = 0.25
 
-# Share of the pixels that is saturated at either end of the grey values.
+# Share of the pixels that is saturated at each end of the grey values.
 _SATURATED = 0.01
 
-# It is estimated from about so many pixels.
+# Approximate number of pixels from which the ends are estimated.
 _QUANTILE_PIXELS = 20_000
 
-# A keypoint needs valid pixels up to so many of its scales.
+# A keypoint needs valid pixels within this many of its scales.
 _SEES_SCALES = 3.0
 
 
@@ -50,7 +49,7 @@ class SiftDetector:
     Parameters
     ----------
     contrast
-        Least contrast of a keypoint as OpenCV counts it (three times Lowe's), as a share of the
+        Least contrast of a keypoint in OpenCV's definition (three times Lowe's), as a share of the
         range of grey values.
     """
 
@@ -59,8 +58,8 @@ class SiftDetector:
     def detect(self, window: Patch) -> Keypoints:
         """Return the keypoints of an image window, upright, each position and scale once.
 
-        Grey values are compressed to a logarithmic scale first, on which speckle is alike
-        everywhere.
+        Grey values are first compressed to a logarithmic scale, on which speckle has the same
+        variance everywhere.
         """
         if window.is_flat:
             return Keypoints.none()
@@ -102,7 +101,7 @@ class SiftOctDetector(SiftDetector):
 
 def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
     """Return an image as bytes, its valid grey values stretched over their range."""
-    # Some of a large image's pixels are as good as all.
+    # A sample of a large image's pixels is sufficient.
     step = max(int(np.sqrt(image.size / _QUANTILE_PIXELS)), 1)
     sample = image[::step, ::step][valid[::step, ::step]]
     if sample.size == 0:
@@ -115,9 +114,9 @@ def to_grey(image: FloatImage, valid: NDArray[np.bool_]) -> ByteImage:
 def seen_whole(
     found: Keypoints, valid: NDArray[np.bool_], scales: float = _SEES_SCALES
 ) -> NDArray[np.bool_]:
-    """Return which keypoints have nothing masked within so many of their scales.
+    """Return which keypoints have no masked pixel within a number of their scales.
 
-    The image's own border does not count.
+    The image's own border does not count as masked.
     """
     distance = distance_to_masked(valid)
     last = np.array(valid.shape)[::-1] - 1

@@ -1,7 +1,7 @@
 """Histograms of oriented gradients as descriptors of keypoints ([Patel2017] 4.3–4.5).
 
-The patch of 41 × 41 pixels around a keypoint is divided into 3 × 3 cells; each has a histogram of
-the directions of gradients, which neither contrast nor its sign changes: 81 values with nine
+The patch of 41 × 41 pixels around a keypoint is divided into 3 × 3 cells. Each has a histogram of
+the directions of gradients, which is invariant to contrast and its sign: 81 values with nine
 directions, 63 with seven. [Dalal2005].
 """
 
@@ -25,20 +25,21 @@ from .scale_space import Gradient, gradient_at_scale
 PATCH_PX = 41
 CELLS = 3
 
-# Scale at which gradients are taken, in pixels.
+# Scale of the gradients, in pixels.
 _SCALE_PX = 2.0
 
 _REACH_PX = PATCH_PX // 2
 
-# So many keypoints are described at a time: their patches fit into the last cache. Directions are
-# spread for so many rows of them at a time: what a band needs is soon used again, and found there.
+# Number of keypoints that are described at a time: their patches fit into the last-level cache.
+# Number of rows for which directions are spread at a time, so that a band is still in that cache
+# when its keypoints are described.
 _BLOCK = 64
 _BAND_ROWS = 128
 
 
 @dataclass(frozen=True)
 class HogDescriptor:
-    """How keypoints are described: all have patches of one size that keep the image's axes.
+    """Descriptor of keypoints by upright patches of one size.
 
     Parameters
     ----------
@@ -50,19 +51,19 @@ class HogDescriptor:
 
     @property
     def length(self) -> int:
-        """How many values a descriptor has."""
+        """Number of values of a descriptor."""
         return CELLS * CELLS * self.directions
 
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
-        """Return the n keypoints and what is around them.
+        """Return the n keypoints and their descriptors.
 
         Parameters
         ----------
         window
             The image; masked pixels add nothing.
         found
-            Keypoints in it, shape (n,). Patches lie on the nearest pixels: half a pixel is little
-            in a patch, and what patches share is found once.
+            Keypoints in it, shape (n,). Patches are centred on the nearest pixels: half a pixel is
+            little in a patch, and pixels that patches share are computed once.
 
         Returns
         -------
@@ -91,9 +92,9 @@ class HogDescriptor:
         return unit_rows(values.reshape(len(points), self.length))
 
     def _band(self, fields: Gradient, first: int) -> FloatImage:
-        """Return the share of all directions at the pixels that patches of a band of rows have.
+        """Return the shares of all directions at the pixels of the patches in a band of rows.
 
-        Shape (rows, columns, directions); patches reach beyond the image, where there is nothing.
+        Shape (rows, columns, directions); 0 beyond the image, where patches may reach.
         """
         height, width = fields[0].shape
         top, stop = max(first - _REACH_PX, 0), min(first + _BAND_ROWS + _REACH_PX, height)
@@ -110,8 +111,8 @@ class HogDescriptor:
     def _in_cells(
         self, band: FloatImage, cols: NDArray[np.intp], rows: NDArray[np.intp]
     ) -> FloatImage:
-        """Return what the cells of patches in a band hold, shape (n, 3, 3, directions)."""
-        # A patch's row is a row of all directions of its pixels, side by side.
+        """Return the cells' histograms of patches in a band, shape (n, 3, 3, directions)."""
+        # A patch's row holds all directions of its pixels, side by side.
         length = PATCH_PX * self.directions
         patch_rows = sliding_window_view(band.reshape(len(band), -1), length, axis=1)
         down = rows[:, None] + np.arange(PATCH_PX)
@@ -124,13 +125,13 @@ class HogDescriptor:
 def directed_shares(
     strength: FloatImage, angle: FloatImage, directions: int
 ) -> Iterator[FloatImage]:
-    """Return, direction by direction, the share that gradients have in it."""
+    """Yield the share of gradients in each direction."""
     count = np.float32(directions)
     place = angle * (count / np.float32(np.pi))
     # Opposite directions are the same: from the first one to where it comes again.
     place -= count * np.floor(place / count)
     for number in range(directions):
-        # Neighbouring directions share what lies between them.
+        # A gradient between two directions is shared by both.
         away = np.abs(place - np.float32(number))
         if number == 0:
             np.minimum(away, count - place, out=away)

@@ -1,4 +1,4 @@
-"""Keypoints: where they are, how large, which way they point and how strong they are."""
+"""Keypoints: their positions, scales, orientations and strengths."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ..rasters.grid import FloatArray
 
 @dataclass(frozen=True)
 class Keypoints(Rows):
-    """A table of keypoints, one row a keypoint.
+    """A table of keypoints, one per row.
 
     Parameters
     ----------
     position_px
         Position (col, row), pixel centres at integers, shape (n, 2).
     scale_px
-        Characteristic scale: standard deviation of the Gaussian at which the keypoint stands out
-        most, in pixels, shape (n,).
+        Characteristic scale: standard deviation of the Gaussian with the keypoint's strongest
+        response, in pixels, shape (n,).
     orientation_rad
         Direction of the gradients around it, from columns towards rows, shape (n,); 0 for upright
-        ones.
+        keypoints.
     response
-        How far it stands out; larger is stronger, shape (n,).
+        Strength of the response, larger is stronger, shape (n,).
     """
 
     position_px: FloatArray
@@ -40,8 +40,8 @@ class Keypoints(Rows):
         return cls(np.zeros((0, 2)), nothing, nothing, nothing)
 
     def strongest(self, count: int) -> Keypoints:
-        """Return at most so many keypoints: those with the largest response, in their order."""
+        """Return at most `count` keypoints with the largest responses, in their order."""
         if len(self) <= count:
             return self
-        # Among equals the first are kept.
+        # The first of equal responses are kept.
         return self.take(np.sort(np.argsort(-self.response, kind="stable")[:count]))

@@ -1,4 +1,4 @@
-"""Labelled keypoints of an image, from a raster or a vector layer, to train a classifier with."""
+"""Labelled keypoints of an image, from a raster or a vector layer, for training a classifier."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from .tiles import MARGIN_PX, Detecting, inside, tiles
 
 Labels = NDArray[np.int8]
 
-# What a keypoint is labelled: to be kept, to be left out, or not at all.
+# Labels of keypoints: to be kept, to be left out, or none.
 KEPT, LEFT_OUT, UNKNOWN = 1, 0, -1
 
 
-# A keypoint's descriptor sees its whole patch: matches are rarely right if more of it than this is
-# to be left out (reasoned, not tuned).
+# A keypoint's descriptor depends on its whole patch: matches are rarely right if more than this
+# share of the patch is to be left out (reasoned, not tuned).
 _LARGEST_SHARE = 0.25
 
 
@@ -43,9 +43,9 @@ class RasterLabels:
     source
         The raster.
     left_out
-        The values.
+        The values to be left out.
     chosen
-        Whether points were chosen: the sizes of the classes mean nothing then.
+        Whether points were chosen; the sizes of the classes are then not representative.
     """
 
     source: RasterSource
@@ -60,7 +60,7 @@ class RasterLabels:
         return np.where(known, labels, UNKNOWN).astype(np.int8)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
-        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
+        """Return the source's own points as positions on a grid, shape (m, 2), and their labels."""
         return np.zeros((0, 2)), np.zeros(0, np.int8)
 
 
@@ -82,17 +82,17 @@ class LayerLabels:
 
     @property
     def chosen(self) -> bool:
-        """As `RasterLabels` has it: points are chosen, and polygons are not."""
+        """Whether points were chosen (see `RasterLabels`): points are, polygons are not."""
         return len(self.xy) > 0
 
     def label(self, piece: Grid) -> Labels:
         """Return the labels of a grid's pixels, shape (h, w)."""
-        # Where nothing is drawn, 0, labels are unknown.
+        # Pixels on which no polygon is drawn, 0, have unknown labels.
         shapes = [(geometry, label - UNKNOWN) for geometry, label in self.areas]
         return np.asarray(drawn_onto(piece, shapes, np.uint8).astype(np.int8) + UNKNOWN, np.int8)
 
     def points(self, piece: Grid) -> tuple[FloatArray, Labels]:
-        """Return points of its own as positions on a grid, shape (m, 2), and their labels."""
+        """Return the source's own points as positions on a grid, shape (m, 2), and their labels."""
         return piece.map_to_pixel(self.xy), self.labels
 
 
@@ -100,19 +100,19 @@ LabelSource = RasterLabels | LayerLabels
 
 
 def patch_labels(labels: Labels, px: FloatArray) -> Labels:
-    """Return the labels of keypoints by those of all pixels in their patches.
+    """Return the labels of keypoints, from those of all pixels in their patches.
 
     Parameters
     ----------
     labels
-        Of the pixels, shape (h, w).
+        Labels of the pixels, shape (h, w).
     px
         Positions (col, row) of n keypoints, shape (n, 2).
 
     Returns
     -------
-    Shape (n,): unknown where the keypoint's own pixel is, and left out where more than a quarter
-    of the known pixels of the patch around it is.
+    Shape (n,): unknown if the keypoint's own pixel is, left out if more than a quarter of the known
+    pixels in the patch around it are.
     """
     left_out, known = (
         window_sums(which.astype(np.float32), PATCH_PX)
@@ -129,7 +129,7 @@ def raster_labels(source: RasterSource, left_out: Sequence[str]) -> RasterLabels
     Raises
     ------
     ParameterError
-        What is left out are no numbers.
+        The values to be left out are no numbers.
     """
     for text in left_out:
         try:
@@ -147,13 +147,13 @@ def layer_labels(
     Parameters
     ----------
     path
-        Any vector file that fiona reads; its first layer is taken.
+        Any vector file that fiona reads; its first layer is used.
     field
-        Name of the attribute of the class.
+        Name of the attribute with the class.
     left_out
         Values of the attribute that are to be left out; all others are kept.
     grid
-        That of the image.
+        Grid of the image.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def layer_labels(
 
 
 def _is_one_of(value: Any, texts: Sequence[str]) -> bool:
-    """Whether a value is among those that texts state: numbers of a layer may be 1 or 1.0."""
+    """Whether a value is one of the texts; numbers of a layer are compared as numbers (1 = 1.0)."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value) in texts
     return any(value == _number(text) for text in texts)
@@ -204,20 +204,20 @@ def labelled_points(
     statistics: str,
     context: Context,
 ) -> Training:
-    """Return labelled keypoints of an image, and labelled points, with what is around them.
+    """Return an image's labelled keypoints, and labelled points, with statistics of their patches.
 
     Parameters
     ----------
     image
         The image; it is read in tiles.
     labels
-        Which are to be kept.
+        Source of the labels.
     detector
-        What finds keypoints.
+        Detector of the keypoints.
     statistics
         One of `patch_statistics.STATISTICS`.
     context
-        Where tiles are looked at.
+        Threads in which tiles are processed.
     """
     grid = image.source.grid
     looked_at = len(image.source.image_bands) if statistics == BAND_RATIOS else 0

@@ -1,4 +1,4 @@
-"""Which keypoints belong together: by nearest descriptors, their ratio, and where they lie."""
+"""Matches of keypoints by nearest descriptors, with their ratio, near predicted positions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..rasters.grid import FloatArray
 Descriptors = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-# How far a partner may lie from its predicted place ([Suri2010] 6.9.2).
+# Largest distance of a partner from its predicted position ([Suri2010] 6.9.2).
 GATE_PX = 16
 
 
@@ -27,8 +27,8 @@ class Matches(Rows):
     first, second
         Row numbers in both tables, shape (n,).
     ratio
-        Distance of their descriptors over that to the next best partner, 0 to 1, shape (n,); 0 if
-        there is no other.
+        Distance of their descriptors over that to the next best partner, 0 to 1, shape (n,); 0
+        without another partner.
     """
 
     first: Indices
@@ -37,7 +37,7 @@ class Matches(Rows):
 
     @classmethod
     def of(cls, nearest: Nearest) -> Matches:
-        """Return the keypoints that have a nearest partner, and these."""
+        """Return the matches of the keypoints that have a nearest partner."""
         which = np.nonzero(nearest.index >= 0)[0]
         distance, following = nearest.distance[which], nearest.next_distance[which]
         ratio = np.ones(len(which))
@@ -47,7 +47,7 @@ class Matches(Rows):
 
 @dataclass(frozen=True)
 class Nearest:
-    """For each keypoint its nearest partner, -1: none, and the distances to it and to the next."""
+    """Nearest partner of each keypoint, -1 for none, and the distances to it and to the next."""
 
     index: Indices
     distance: FloatArray
@@ -61,21 +61,21 @@ def match_near(
     position_px: FloatArray,
     gate_px: float = GATE_PX,
 ) -> Matches:
-    """Match keypoints that are each other's nearest, near where partners are predicted.
+    """Match keypoints that are mutual nearest neighbours, near predicted positions.
 
-    Only partners within the gate are compared, which leaves hundreds of times fewer wrong ones
-    than the whole image has; so the ratio need not separate inliers from outliers ([Suri2010] 6.9).
+    Only partners within the gate are compared. They include hundreds of times fewer wrong ones than
+    the whole image, so that the ratio need not separate inliers from outliers ([Suri2010] 6.9).
 
     Parameters
     ----------
     first, second
         Descriptors, shapes (n, k) and (m, k).
     predicted_px
-        Where the partners of the first should lie, shape (n, 2).
+        Predicted positions of the first ones' partners, shape (n, 2).
     position_px
-        Where the second lie, shape (m, 2).
+        Positions of the second ones, shape (m, 2).
     gate_px
-        How far a partner may lie from there.
+        Largest distance of a partner from its predicted position.
     """
     pairs = _pairs_within(predicted_px, position_px, gate_px)
     distance = _pair_distances(first, second, pairs)
@@ -108,7 +108,7 @@ def _pair_distances(first: Descriptors, second: Descriptors, pairs: Indices) -> 
 
 
 def _best_of_each(pairs: Indices, distance: FloatArray, count: int) -> Nearest:
-    """Return the nearest and the next partner of each of `count` features of the first column."""
+    """Return the nearest partner and the next distance for `count` features of the first column."""
     order = np.lexsort((distance, pairs[:, 0]))
     owner, partner, sorted_distance = pairs[order, 0], pairs[order, 1], distance[order]
     start = np.searchsorted(owner, np.arange(count))

@@ -1,4 +1,4 @@
-"""What the patch around a keypoint is like, in a few numbers ([Patel2017] 5.3)."""
+"""Statistics of the patch around a keypoint ([Patel2017] 5.3)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .hog import PATCH_PX
 
 Means = Callable[[FloatArray], FloatArray]
 
-# What is finer than a mean over so many pixels a side is texture.
+# Side of the window whose mean separates texture from coarser structure.
 _FINE_PX = 5
 
 
@@ -27,7 +27,7 @@ def _mean_and_variance(values: FloatArray, bands: FloatImage, means: Means) -> l
 def _band_ratios(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
     of_bands = [means(band.astype(np.float64)) for band in bands]
     total = np.sum(of_bands, axis=0)
-    # Where all is black, all bands are alike.
+    # In black patches, all bands have equal shares.
     black = np.abs(total) < 1e-9
     total[black] = 1.0
     shares = [np.where(black, 1 / len(bands), mean / total) for mean in of_bands]
@@ -60,14 +60,14 @@ def patch_statistics(
     ----------
     name
         One of `STATISTICS`: "mean-variance"; "band-ratios", which adds the share of each band in
-        the sum of all: clouds have no colour; or "texture", which adds the skewness of the grey
-        values, the mean strength of gradients and the variance of what is finer than 5 pixels.
+        the sum of all bands, as clouds have no colour; or "texture", which adds the skewness of the
+        grey values, the mean strength of gradients and the variance of detail finer than 5 pixels.
     window
         The image; masked pixels do not count.
     px
         Positions (col, row) in the window, shape (n, 2).
     bands
-        All bands of the window, shape (bands, h, w); only "band-ratios" looks at them.
+        All bands of the window, shape (bands, h, w); only "band-ratios" uses them.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def patch_statistics(
     if len(px) == 0 or not window.valid.any():
         nothing = STATISTICS[name](np.zeros((1, 1)), bands[:, :1, :1], lambda v: v)
         return np.zeros((len(px), len(nothing)))
-    # Around the mean, powers of grey values lose no digits.
+    # Grey values are centred, so that their powers lose no digits.
     centre = float(window.values[window.valid].mean())
     values = np.where(window.valid, window.values - centre, 0.0)
     counts = window_sums(window.valid.astype(np.float64), PATCH_PX)

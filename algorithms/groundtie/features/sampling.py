@@ -1,4 +1,4 @@
-"""Gradients sampled at places that rotate and grow with keypoints."""
+"""Gradients sampled at positions that rotate and scale with keypoints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .scale_space import Gradient
 
 
 def square_samples(half: float, count: int) -> FloatArray:
-    """Return count² positions (x, y) in the middle of the squares of ± half."""
+    """Return the centres (x, y) of count² squares that divide the square of ± half."""
     side = (np.arange(count) + 0.5) * (2 * half / count) - half
     return mesh(side, side)
 
@@ -20,7 +20,7 @@ def square_samples(half: float, count: int) -> FloatArray:
 def samples_around(points: Keypoints, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return columns and rows, shape (n, m) each, of samples around each of n keypoints.
 
-    Positions of samples, shape (m, 2), are in scales of a keypoint, along and across its
+    Sample positions, shape (m, 2), are in units of a keypoint's scale, along and across its
     orientation.
     """
     cosine, sine = np.cos(points.orientation_rad)[:, None], np.sin(points.orientation_rad)[:, None]
@@ -42,11 +42,11 @@ def sampled_gradient(
     points
         n keypoints, in pixels of the fields.
     samples
-        Positions in scales of a keypoint, along and across its orientation, shape (m, 2).
+        Positions in units of a keypoint's scale, along and across its orientation, shape (m, 2).
 
     Returns
     -------
-    Strength and direction against the keypoint's orientation, shape (n, m) each.
+    Strength, and direction relative to the keypoint's orientation, shape (n, m) each.
     """
     x, y = samples_around(points, samples)
     at = np.asarray(x, np.float32), np.asarray(y, np.float32)

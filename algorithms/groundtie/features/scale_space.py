@@ -1,4 +1,4 @@
-"""Gradients of an image, and at the scales of its keypoints, for whatever describes these."""
+"""Gradients of an image at given scales and at those of its keypoints, for descriptors."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ..rasters.reading import FloatImage
 from ..similarity.orientation import ROUNDING
 from .keypoints import Keypoints
 
-# Derivatives along columns and rows, shape (h, w) each, and what estimates them.
+# Derivatives along columns and rows, shape (h, w) each, and their estimator.
 Gradient = tuple[FloatImage, FloatImage]
 GradientOperator = Callable[[FloatImage], Gradient]
 
-# Scale space: layers an octave, the first scale, and how much an image is blurred as it is, as
-# [Lowe2004] has them, and OpenCV.
+# Scale space: layers per octave, the first scale, and the blur of an original image, as in
+# [Lowe2004] and OpenCV.
 LAYERS = 3
 FIRST_SCALE_PX = 1.6
 IMAGE_BLUR_PX = 0.5
 
-# A gradient sees what lies within so many scales, but for the Gaussian's tail.
+# Reach of a gradient in scales, except for the Gaussian's tail.
 _SEES_SCALES = 2.5
 
-# So many keypoints are described at a time.
+# Number of keypoints that are described at a time.
 _BLOCK = 512
 
 
@@ -46,16 +46,18 @@ def gradients_at_scales(
     found: Keypoints,
     gradient: GradientOperator = differences,
 ) -> Iterator[tuple[NDArray[np.intp], Keypoints, Gradient]]:
-    """Yield some keypoints after others, by number and in pixels of the gradient at their scale.
+    """Yield blocks of keypoints: row numbers, the points in a gradient's pixels, and that gradient.
+
+    The gradient is at the scale of the block's keypoints.
 
     Parameters
     ----------
     image, valid
-        Grey values and which of them count, shape (h, w).
+        Grey values and their validity, shape (h, w).
     found
         Keypoints, shape (n,).
     gradient
-        What estimates the gradient of an image.
+        Estimator of an image's gradient.
     """
     layer_of = _layer_of(found.scale_px)
     layers = [int(layer) for layer in np.unique(layer_of)]
@@ -78,13 +80,13 @@ def gradient_at_scale(image: FloatImage, valid: NDArray[np.bool_], scale_px: flo
     Parameters
     ----------
     image, valid
-        Grey values and which of them count, shape (h, w).
+        Grey values and their validity, shape (h, w).
     scale_px
         The scale, below twice that of the first octave, whose pixels are the image's.
 
     Returns
     -------
-    Two arrays of shape (h, w), zero where masked pixels are seen.
+    Two arrays of shape (h, w), zero within reach of masked pixels.
     """
     layer = _layer_of(scale_px)
     (level,) = _scale_space(image, [layer])
@@ -98,12 +100,12 @@ def _layer_of(scale_px: Any) -> Any:
 
 
 def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImage]:
-    """Return an image blurred to the scales of rising layers, each in the pixels of its octave."""
+    """Yield an image blurred to the scales of ascending layers, in the pixels of their octaves."""
     own = _blurred(image, IMAGE_BLUR_PX, FIRST_SCALE_PX)
     octave = 0
     for layer in layers:
         while octave < _octave_of(layer):
-            # The first pixels lie on one another.
+            # The first pixels of all octaves coincide.
             own = _blurred(own, FIRST_SCALE_PX, 2 * FIRST_SCALE_PX)[::2, ::2]
             octave += 1
         if layer <= 0:
@@ -113,7 +115,7 @@ def _scale_space(image: FloatImage, layers: Iterable[int]) -> Iterator[FloatImag
 
 
 def _octave_of(layer: int) -> int:
-    """Return the octave in whose pixels a layer is; those of the enlarged image stay in 0."""
+    """Return the octave whose pixels a layer has; layers of the enlarged image have those of 0."""
     return max((layer - 1) // LAYERS, 0)
 
 
@@ -122,13 +124,13 @@ def _scale_of(layer: int) -> float:
 
 
 def _blurred(image: FloatImage, blur_px: float, wanted_px: float) -> FloatImage:
-    """Return an image that is blurred by `blur_px` already as one blurred by `wanted_px`."""
+    """Blur an image further, from a total blur of `blur_px` to one of `wanted_px`."""
     more = float(np.sqrt(max(wanted_px**2 - blur_px**2, 0.01)))
     return np.asarray(cv2.GaussianBlur(np.ascontiguousarray(image), (0, 0), more), np.float32)
 
 
 def _gradient(level: FloatImage, seen: NDArray[np.bool_], gradient: GradientOperator) -> Gradient:
-    """Return the gradient of a level, zero where masked pixels are seen or all is rounding."""
+    """Return the gradient of a level, zero within reach of masked pixels and below rounding."""
     along_cols, along_rows = gradient(level)
     least = np.float32(ROUNDING * np.abs(level).max())
     counts = seen & (along_cols**2 + along_rows**2 > least**2)

@@ -1,4 +1,4 @@
-"""Tiles in which keypoints are found, and what finds and describes them there."""
+"""Tiles in which keypoints are found, and interfaces of their detectors and descriptors."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, Window
 from .keypoints import Keypoints
 
-# Tiles of a grid, and what keypoints near their border see beyond it.
+# Side of tiles, and the margin beyond their border that keypoints near it depend on.
 _TILE_PX = 1024
 MARGIN_PX = 64
 
 
 class Detecting(Protocol):
-    """What finds keypoints."""
+    """Detector of keypoints."""
 
     def detect(self, window: Patch) -> Keypoints:
         """Return the keypoints of an image window, upright."""
 
 
 class Describing(Protocol):
-    """What describes keypoints."""
+    """Descriptor of keypoints."""
 
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return m keypoints, which may be repeated, and their descriptors, shape (m, k)."""
 
 
 def inside(px: FloatArray, window: Window) -> Mask:
-    """Return which positions (col, row), shape (n, 2), lie on the pixels of a window."""
+    """Return whether positions (col, row), shape (n, 2), lie on the pixels of a window."""
     at = np.rint(px)
     low = np.array([window.col, window.row])
     return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))

@@ -1,1 +1,1 @@
-"""What takes part: masks that keep elevated objects out of the similarity."""
+"""Masks that keep elevated objects out of the similarity."""

@@ -1,4 +1,4 @@
-"""Masks that a mission delivers with an image, found by its naming."""
+"""Masks that a mission delivers with an image, found by the mission's file names."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ _PLANET = re.compile(
 
 
 def mask_beside(image: Path | str) -> tuple[Path, str] | None:
-    """Return the mask that belongs to an image, if both have the names that the mission gives.
+    """Return the mask of an image and the scheme of its values, if both have the mission's names.
 
-    With it comes the scheme of its values (see `values.SCHEMES`). Sentinel-2 L2A has its
-    classification in the folder of another pixel size. Only files on disk are looked for: what is
-    asked of a server costs a request each.
+    For schemes see `values.SCHEMES`. Sentinel-2 L2A has its classification in the folder of another
+    pixel size. Only files on disk are searched for, as each query to a server costs a request.
     """
     if isinstance(image, str):
         return None

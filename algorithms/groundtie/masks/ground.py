@@ -1,9 +1,9 @@
-"""Ground of a town: what lies apart from layover and radar shadow, and where no roof lies.
+"""Ground of a town: pixels apart from layover, radar shadow and roofs.
 
 Along the radar's range direction an elevated object shows its bright layover first and its shadow
-last. So a roof has layover before it and shadow behind it; ground between buildings has the shadow
-of the nearer one before it and the layover of the farther one behind it. Layover and shadow mark
-where ground ends better than its brightness or texture.
+last. A roof therefore has layover before it and shadow behind it; ground between buildings has the
+shadow of the nearer one before it and the layover of the farther one behind it. Layover and shadow
+delimit the ground better than its brightness or texture.
 """
 
 from __future__ import annotations
@@ -20,29 +20,30 @@ from .reduced import BlockMask, ReducedScene, reduction
 from .scene import Scene
 from .shadow_direction import shadow_azimuth_deg
 
-# Dark lies behind bright at all distances up to a building's layover and shadow together; nothing
-# farther matters. This and what follows was set on simulated cities (suites ground and towns).
+# Dark pixels lie behind bright ones at distances up to the length of a building's layover and
+# shadow together; larger distances are cut off. This and the following values were set on simulated
+# cities (suites ground and towns).
 _APART_M = 40.0
 _OUTER_PERCENT = 25.0
 
-# Of means over 3 × 3 pixels, so many of the darkest may be radar shadow, and of the brightest
-# layover.
+# Percentage of the darkest means over 3 × 3 pixels that may be radar shadow, and of the brightest
+# that may be layover.
 _MEAN_PX = 3
 _DARK_PERCENT, _BRIGHT_PERCENT = 25.0, 20.0
 
-# Ground lies so far from both, and by so many pixels.
+# Least mean distance of ground from layover and shadow, in metres and in pixels.
 _GROUND_M, _GROUND_PX = 7.0, 3.0
 
-# In larger pixels a street 18 m wide, as main streets are, has no place that lies so far from
-# layover and shadow on both sides; what does is roofs. Suite coarse_towns: in pixels of 3 m the
-# ground that is found registers towns right; without this limit, in 4 to 6 m, up to 4.5 px wrong.
+# In larger pixels, no place in a main street, 18 m wide, lies far enough from layover and shadow on
+# both sides; only roofs do. Suite coarse_towns: towns are registered right by the ground found in
+# pixels of 3 m, and without this limit up to 4.5 px wrong in pixels of 4 to 6 m.
 _COARSEST_M = 3.0
 
 
 def shows_ground(scene: Scene) -> bool:
-    """Whether a radar image, reduced as `find_ground` does, resolves ground between buildings.
+    """Whether a radar image, reduced as in `find_ground`, resolves ground between buildings.
 
-    Without a CRS nobody knows.
+    False without a CRS, as the pixel size is unknown.
     """
     grid = scene.grid
     return grid.crs is not None and grid.pixel_size_m * reduction(scene) <= _COARSEST_M
@@ -61,7 +62,7 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
     Raises
     ------
     RasterContentError
-        No pixel of the scene is valid, or they are too large to resolve it, or of unknown size.
+        No pixel of the scene is valid, or pixels are too large to resolve it, or of unknown size.
     """
     if scene.grid.crs is None:
         raise RasterContentError(
@@ -82,16 +83,17 @@ def find_ground(scene: Scene, progress: Progress = SILENT) -> BlockMask:
 def ground_between_buildings(level_db: FloatImage, valid: Mask, pixel_m: float) -> Mask:
     """Return the ground between the buildings of a radar image.
 
-    It is where the geometric mean of distances is large: to the nearest layover and to the nearest
-    shadow in any direction, which count twice, to layover before the place as the radar looks, and
-    to shadow behind it. Where the radar looks is inferred from the image.
+    Ground is where a geometric mean of four distances is large: to the nearest layover and to the
+    nearest shadow in any direction, both with double weight, to the layover before the place in the
+    radar's look direction, and to the shadow behind it. The look direction is inferred from the
+    image.
 
     Parameters
     ----------
     level_db
         Smoothed image in decibels, shape (h, w).
     valid
-        Which of its pixels are valid, same shape.
+        Validity of its pixels, same shape.
     pixel_m
         Size of a pixel.
     """
@@ -114,7 +116,7 @@ def ground_between_buildings(level_db: FloatImage, valid: Mask, pixel_m: float) 
 
 
 def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:
-    """Return how far each pixel lies behind the nearest of a mask, on lines in a direction.
+    """Return the distance of each pixel from the nearest mask pixel before it along a direction.
 
     Parameters
     ----------
@@ -133,7 +135,7 @@ def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:
     axis = int(np.abs(way).argmax())
     forward = slice(None, None, 1 if way[axis] > 0 else -1)
     lines = (mask if axis == 0 else mask.T)[forward]
-    # A line of sight moves aside from one row to the next; it keeps its place in `last`.
+    # A line of sight moves sideways from one row to the next, but keeps its place in `last`.
     aside = np.rint(np.arange(len(lines)) * way[1 - axis] / abs(way[axis])).astype(int)
     places = aside.max() - aside
     last: NDArray[np.float32] = np.full(lines.shape[1] + np.ptp(aside), -np.inf, np.float32)

@@ -1,4 +1,4 @@
-"""Region growing, from seeds to all connected pixels of like brightness, and regions' shapes."""
+"""Region growing from seeds to connected pixels of similar brightness, and the regions' shapes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ..rasters.reading import Mask, Window
 
-# One seed at most in each square of this side, in pixels.
+# Side of the squares that hold at most one seed, in pixels.
 _SEED_PX = 8
 
-# Marks in OpenCV's mask: not to be entered, the region that grows.
+# Values in OpenCV's mask: pixels that must not be entered; the growing region.
 _TAKEN, _GROWING = 1, 2
 
 
@@ -38,10 +38,10 @@ def grow_regions(
     tolerance_db: float,
     smallest_px: int,
 ) -> Iterator[Region]:
-    """Yield the homogeneous regions of an image, from the most homogeneous seed on.
+    """Yield the homogeneous regions of an image, the most homogeneous seed first.
 
-    Region growing [Castleman1996]: a region takes in neighbours that differ from its
-    seed by no more than a tolerance. No pixel belongs to two regions.
+    Region growing [Castleman1996]: a region absorbs neighbours that differ from its seed by no
+    more than a tolerance. No pixel belongs to two regions.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def grow_regions(
     variation2
         Squared coefficient of variation around each pixel, same shape.
     valid
-        Which pixels may belong to a region, same shape.
+        Pixels that may belong to a region, same shape.
     seed_variation2
-        Pixels of larger variation are no seeds.
+        Largest variation of a seed.
     tolerance_db
         Largest difference from the seed.
     smallest_px
@@ -76,7 +76,7 @@ def grow_regions(
 
 
 def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
-    """Return rows and columns, shape (n, 2), of the least variation in each square, least first."""
+    """Return rows and columns, (n, 2), of the least variation in each square, in rising order."""
     height, width = (side // _SEED_PX for side in variation2.shape)
     squares = variation2[: height * _SEED_PX, : width * _SEED_PX]
     squares = squares.reshape(height, _SEED_PX, width, _SEED_PX).swapaxes(1, 2)
@@ -91,7 +91,7 @@ def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class Shape:
-    """Area, and the sides of the rectangle that has the region's second moments, in pixels."""
+    """Area, and sides of the rectangle with the region's second moments, in pixels."""
 
     area: float
     length: float
@@ -99,10 +99,10 @@ class Shape:
 
     @classmethod
     def of(cls, region: Mask) -> Shape:
-        """Return the shape of the pixels, one at least, of a mask, shape (h, w)."""
+        """Return the shape of a mask, shape (h, w), with at least one pixel."""
         m = cv2.moments(region.astype(np.uint8), binaryImage=True)
         area = m["m00"]
-        # A pixel is a square: it has moments of its own.
+        # Each pixel is a square with second moments of its own.
         xx, yy, xy = m["mu20"] / area + 1 / 12, m["mu02"] / area + 1 / 12, m["mu11"] / area
         middle, half = (xx + yy) / 2, float(np.hypot((xx - yy) / 2, xy))
         sides = np.sqrt(12 * np.maximum([middle + half, middle - half], 0))

@@ -1,4 +1,4 @@
-"""Masks by a vector layer: roads, waters, squares of a map."""
+"""Masks by a vector layer, such as a map's roads, waters and squares."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class LayerMask:
     areas, lines
         GeoJSON geometries on the scene's map.
     reach_px
-        Half of the width of the lines.
+        Half the width of the lines.
     is_outside
-        Whether what it does not cover takes part instead.
+        Whether the area that it does not cover takes part instead.
     """
 
     scene: Scene
@@ -46,9 +46,10 @@ class LayerMask:
     is_outside: bool = False
 
     def select(self, window: Window) -> Selection:
-        """Return which pixels of a window take part: those that it covers.
+        """Return the pixels of a window that take part: those that the layer covers.
 
-        Of areas those whose centres lie in them; of lines all that these touch, and so many around.
+        An area covers the pixels whose centres lie in it. A line covers the pixels along it
+        (Bresenham's algorithm) and those within `reach_px` of them.
         """
         around = window.widened(self.reach_px)
         along = grown(self._drawn(self.lines, around), self.reach_px)[window.slices_in(around)]
@@ -67,18 +68,20 @@ def drawn_onto(
     dtype: type[_Number],
     all_touched: bool = False,
 ) -> NDArray[_Number]:
-    """Return shapes' values on the pixels of a grid, shape (h, w); 0 where there is none.
+    """Return shapes' values on the pixels of a grid, shape (h, w); 0 outside all shapes.
 
     Parameters
     ----------
     grid
         The pixels.
     shapes
-        GeoJSON geometries on the grid's map and their values; the last one counts.
+        GeoJSON geometries on the grid's map and their values; where they overlap, the last one
+        counts.
     dtype
-        Of the values.
+        Type of the values.
     all_touched
-        Whether a shape covers all pixels that it touches; else those whose centres it covers.
+        Whether a shape covers all pixels that it touches; else a polygon covers those whose centres
+        lie in it.
     """
     from rasterio.features import rasterize
 
@@ -94,7 +97,7 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     Parameters
     ----------
     path
-        Any vector file that fiona reads; its first layer is taken.
+        Any vector file that fiona reads; its first layer is used.
     scene
         The image.
     width_m

@@ -1,4 +1,4 @@
-"""Heights of elevated objects over a map: of a surface model, or of buildings' footprints."""
+"""Heights of elevated objects over a map, from a surface model or from buildings' footprints."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from .layer import AREAS, drawn_onto
 from .ray_casting import Heights
 from .scene import sampled_onto
 
-# What is wider is taken for ground: halls and blocks are up to so wide, or have courtyards.
+# Wider objects count as ground: halls and blocks are at most this wide, or have courtyards.
 WIDEST_M = 100.0
 
-# What rises by less is taken for ground: cars, hedges, the noise of a surface model.
+# Lower objects count as ground: cars, hedges, the noise of a surface model.
 LOWEST_M = 2.0
 
-# So far around a place, heights tell its ground: the widest object, and the mean's window.
+# Heights within this distance determine a place's ground: the widest object, and the mean's window.
 GROUND_REACH_M = 1.5 * WIDEST_M
 
-# Pixels within which the lowest height counts as ground, in metres: courtyards are wider.
+# Side of the cells whose lowest height counts as ground, in metres; courtyards are wider.
 _GROUND_CELL_M = 4.0
 
-# Nothing on Earth lies so high.
+# Placeholder above all heights on Earth.
 _NOWHERE_M = np.float32(1e5)
 
-# Heights are summed up as whole numbers of these: the same whatever is summed up before them.
+# Heights are summed as whole numbers of this step, so that running sums leave no rounding behind.
 _STEP_M = 1 / 1024
 
 _HEIGHT_FIELDS = ("height", "height_m", "hoehe", "z_height", "measuredheight")
@@ -47,27 +47,27 @@ _NUMBER = re.compile(r"\s*(\d+(?:\.\d+)?)\s*m?\s*")
 class RasterModel:
     """A raster of heights of roofs, canopies and ground (DSM), on any grid and map.
 
-    The ground is what is left if everything narrower than a block of houses is taken off.
+    The ground is the surface that remains when all objects narrower than a block are removed.
 
     Parameters
     ----------
     raster
         The heights.
     band
-        Number of their band, from 1.
+        Number of the band, from 1.
     """
 
     raster: RasterSource
     band: int = 1
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and where they are known; the ground is found in it."""
+        """Return heights on a grid, and where they are known; the ground is found on this grid."""
         stored, known = sampled_onto(piece, self.raster, "bilinear", self.band)
         surface = in_metres(stored, self.raster, self.band)
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
         ground = bare_ground(surface, known, piece.pixel_size_m)
-        # What is not known hides nothing and is laid over nothing.
+        # Unknown pixels must neither hide other pixels nor be laid over them.
         lowest = np.float32(ground[known].min())
         surface, ground = (np.where(known, part, lowest) for part in (surface, ground))
         return Heights(np.maximum(surface, ground), ground), known
@@ -75,7 +75,7 @@ class RasterModel:
 
 @dataclass(frozen=True)
 class FootprintModel:
-    """Buildings of a vector layer, with heights above their ground; all else is level ground.
+    """Buildings of a vector layer, with heights above level ground.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class FootprintModel:
     buildings: tuple[tuple[Any, float], ...]
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, and that all are known."""
+        """Return heights on a grid, all of them known."""
         surface = drawn_onto(piece, self.buildings, np.float32, all_touched=True)
         return Heights(surface, np.zeros_like(surface)), np.ones(surface.shape, bool)
 
@@ -121,7 +121,7 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
 
 
 def _metres(value: Any) -> float | None:
-    """Return a height in metres, as OpenStreetMap writes it, too; None: there is none."""
+    """Return a height in metres, a number or as OpenStreetMap writes it; None: there is none."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value) if math.isfinite(value) else None
     match = _NUMBER.fullmatch(str(value)) if isinstance(value, str) else None
@@ -129,15 +129,16 @@ def _metres(value: Any) -> float | None:
 
 
 def ground_cell_px(pixel_m: float) -> int:
-    """Return how many pixels a side those cells have whose lowest heights count as ground."""
+    """Return the side, in pixels, of the cells whose lowest heights count as ground."""
     return max(round(_GROUND_CELL_M / pixel_m), 1)
 
 
 def bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
-    """Return the height of the ground below all that is narrower than `WIDEST_M`.
+    """Return the height of the ground below all objects narrower than `WIDEST_M`.
 
-    Morphological opening of cells' lowest heights: level ground and slopes stay as they are. Noise
-    makes the lowest too low: the mean of what is no object lies above that by the same all around.
+    A morphological opening of the cells' lowest heights leaves level ground and slopes unchanged.
+    Noise makes the lowest heights too low; the local mean height of ground pixels above them
+    corrects this.
     """
     cell = ground_cell_px(pixel_m)
     rows, cols = surface.shape
@@ -145,13 +146,13 @@ def bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
     filled = np.pad(np.where(known, surface, _NOWHERE_M), padding, mode="edge")
     blocks = filled.reshape(filled.shape[0] // cell, cell, filled.shape[1] // cell, cell)
     side = _cells(WIDEST_M, cell * pixel_m)
-    # Beyond the border nothing is lower, nor higher.
+    # The opening ignores everything beyond the border.
     opened: FloatImage = np.asarray(
         cv2.morphologyEx(blocks.min(axis=(1, 3)), cv2.MORPH_OPEN, np.ones((side, side), np.uint8)),
         np.float32,
     )
     raised = opened + _mean_above(blocks, opened, _cells(WIDEST_M / 2, cell * pixel_m))
-    # Between the outermost cells and what is not known, those cells' own height holds.
+    # Unknown cells beside known ones get their lowest height, for the interpolation between them.
     rim = cv2.erode(raised, np.ones((3, 3), np.uint8))
     ground = np.where(opened < _NOWHERE_M, raised, rim)
     whole = cv2.resize(ground, filled.shape[::-1], interpolation=cv2.INTER_LINEAR)
@@ -159,9 +160,9 @@ def bare_ground(surface: FloatImage, known: Mask, pixel_m: float) -> FloatImage:
 
 
 def _mean_above(blocks: FloatImage, lowest: FloatImage, side: int) -> FloatImage:
-    """Return how far what is no object rises above the lowest ground on average, (rows, cols).
+    """Return the mean height of ground pixels above the lowest ground, shape (rows, cols).
 
-    Blocks are cells of heights, shape (rows, n, cols, n); the mean is that of `side` cells a side.
+    Blocks are cells of heights, shape (rows, n, cols, n); the mean is over `side` cells a side.
     """
     steps = np.rint((blocks - lowest[:, None, :, None]) / _STEP_M)
     is_ground = (steps <= LOWEST_M / _STEP_M) & (blocks < _NOWHERE_M)
@@ -173,5 +174,5 @@ def _mean_above(blocks: FloatImage, lowest: FloatImage, side: int) -> FloatImage
 
 
 def _cells(length_m: float, cell_m: float) -> int:
-    """Return how many cells a length is, an odd number."""
+    """Return a length in cells, as an odd number."""
     return max(round(length_m / cell_m), 1) | 1

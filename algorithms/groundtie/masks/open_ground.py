@@ -1,7 +1,8 @@
 """Open ground of a radar image, between forests and settlements: areas without texture.
 
-In a homogeneous area speckle alone varies; canopies, roofs and their shadows vary more
-([Lopes1990a]), and so do borders, as those of fields and roads. Borders are narrow, and stay.
+In a homogeneous area, speckle is the only variation; canopies, roofs and their shadows vary more
+([Lopes1990a]), and so do borders, such as those of fields and roads. Borders are narrow, and remain
+part of the open ground.
 """
 
 from __future__ import annotations
@@ -24,20 +25,21 @@ from ..speckle.statistics import (
 from .radar import SAMPLE_PX, power
 from .scene import Scene, Selection
 
-# Areas with texture are where so many windows are not homogeneous. They are wider than three
-# windows: along the border of two regions one is not, along both sides of a road two, which is
-# 82 % of an area where two roads cross: 1 - (1 - 18 / 31)².
+# Side of areas, and the share of inhomogeneous windows from which on they have texture. Areas are
+# wider than three windows: a border of two regions makes one window width inhomogeneous, the two
+# sides of a road make two. Where two roads cross, that is 82 % of the area: 1 - (1 - 18 / 31)².
 _AREA_PX, _SHARE = 31, 0.85
 
-# Radar shadow of trees of 20 m reaches so far at an incidence angle of 37°.
+# Length of the radar shadow of trees 20 m high at an incidence angle of 37°.
 _REACH_M = 15.0
 
 
 @dataclass(frozen=True)
 class OpenGround:
-    """What of a radar image lies apart from areas with texture.
+    """The part of a radar image that lies apart from areas with texture.
 
-    Called with a piece of its grid, or of a reduced one, it returns what is none, as a `MaskOf`.
+    Called with a piece of its grid, or of a reduced one, it returns all other pixels, as a
+    `MaskOf`.
 
     Parameters
     ----------
@@ -52,7 +54,7 @@ class OpenGround:
 
     @classmethod
     def of(cls, scene: Scene) -> OpenGround:
-        """Return that of a scene whose looks are estimated in its middle."""
+        """Return the open ground of a scene; its looks are estimated in the middle."""
         patch = scene.read(middle_window(scene.grid, SAMPLE_PX))
         return cls(scene, estimate_looks(power(patch), patch.valid))
 
@@ -66,9 +68,9 @@ class OpenGround:
         return Selection(far[inside] & valid, valid)
 
     def __call__(self, piece: Grid) -> Mask:
-        """Return which pixels of a piece of the scene's grid are no open ground, shape (h, w).
+        """Return the pixels of a piece of the scene's grid that are no open ground, shape (h, w).
 
-        A pixel of a reduced grid is where all are that it is the mean of.
+        A pixel of a reduced grid is open ground if all pixels that it averages are.
         """
         factor = round(piece.pixel_size_m / self.scene.grid.pixel_size_m)
         corner = self.scene.grid.map_to_pixel(piece.pixel_to_map([[-0.5, -0.5]])) + 0.5
@@ -79,7 +81,7 @@ class OpenGround:
 
     @property
     def _beside_px(self) -> int:
-        """How far from the middle of an area with texture nothing takes part."""
+        """Distance from the middle of an area with texture within which no pixel takes part."""
         return _AREA_PX // 2 + math.ceil(_REACH_M / self.scene.grid.pixel_size_m)
 
     def _areas(self, patch: Patch) -> Mask:

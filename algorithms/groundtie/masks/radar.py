@@ -1,4 +1,4 @@
-"""How radar images differ from a camera's: by the variation of their most homogeneous windows."""
+"""Distinction of radar from camera images, by the variation of their most homogeneous windows."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from ..rasters.patch import Patch, middle_window
 from ..rasters.reading import FloatImage
 from ..speckle.statistics import homogeneous_variation2
 
-# Looked at in the middle of an image, at full resolution: averaging would take speckle away.
+# Side of the sample in the middle of an image, at full resolution: averaging would remove speckle.
 SAMPLE_PX = 1024
 
-# Squared coefficient of variation of the power in the most homogeneous windows of radar images, and
-# how many times that of a camera's it is. Measured at pixels of few metres: 0.09 to 0.24, 12 to 300
-# times; two radar images of one place: 7 times at most.
+# Least squared coefficient of variation of the power in the most homogeneous windows of a radar
+# image, and its least ratio to that of a camera image. Measured in pixels of a few metres: 0.09 to
+# 0.24, ratio 12 to 300; two radar images of one place: ratio 7 at most.
 LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 
 
 def variation2_of(image: Image) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
 
-    Grey values are taken for amplitudes.
+    Grey values are assumed to be amplitudes.
     """
     middle = middle_window(image.source.grid, SAMPLE_PX)
     patch = Patch(*image.source.read(middle, image.band))

@@ -1,7 +1,7 @@
-"""What a sensor sees of the ground between buildings and trees, by rays cast over a surface model.
+"""Visibility of the ground between buildings and trees, by rays cast over a surface model.
 
-A surface model is sampled along rays that run away from the sensor; one running maximum along each
-ray tells how high the line of sight is that grazes what is nearer to the sensor.
+A surface model is sampled along rays that run away from the sensor. One running maximum along each
+ray gives the height of the line of sight that grazes the objects nearer to the sensor.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..rasters.reading import FloatImage, Mask
 _Lines = NDArray[np.float64]
 _T = TypeVar("_T", bound=np.generic)
 
-# What lies lower by less than this is no lower: heights in single precision have 0.001 m at 10 km.
+# Smaller differences of height are ignored: single precision resolves 0.001 m at 10 km.
 _LEVEL_M = 0.05
 
 
@@ -30,12 +30,12 @@ class Heights:
     Parameters
     ----------
     surface_m
-        Height of what is seen from above: roofs, canopies, ground, shape (h, w).
+        Height of the surface seen from above: roofs, canopies, ground, shape (h, w).
     ground_m
         Height of the bare ground, nowhere above the surface, shape (h, w).
     first_px
-        Column and row of the first pixel on the whole map: rays are those of the map, so that
-        pieces of it join.
+        Column and row of the first pixel on the whole map. Rays are laid out on the whole map, so
+        that pieces of it join.
     """
 
     surface_m: FloatImage
@@ -52,7 +52,7 @@ class LineOfSight:
     towards_px
         Columns and rows for a metre of ground towards the sensor.
     tangent
-        Of the angle between the line of sight and the vertical, above 0.
+        Tangent of the angle between the line of sight and the vertical, above 0.
     """
 
     towards_px: tuple[float, float]
@@ -70,7 +70,7 @@ class LineOfSight:
 
     @property
     def rise_m(self) -> float:
-        """By how much the line rises towards the sensor over a pixel."""
+        """Rise of the line towards the sensor over a pixel."""
         return self.pixel_m / self.tangent
 
 
@@ -89,13 +89,13 @@ def hidden_ground(heights: Heights, sight: LineOfSight) -> Mask:
 
 
 def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
-    """Return how many echoes of elevated objects a radar shows over each pixel's ground, (h, w).
+    """Return the number of echoes of elevated objects over each pixel's ground (layover), (h, w).
 
     Roofs and walls are imaged nearer to the radar than their feet, over the ground at the same
-    range: nearer by h / tan(incidence) on level ground. Each pixel of a roof is one echo, and each
-    of the wall before it, as far down as the radar sees it; what it does not see is none.
+    range: nearer by h / tan(incidence) on level ground. Each visible pixel of a roof is one echo,
+    and so is each pixel of the wall before it, down to the lowest visible one.
     """
-    # Pixels of level ground by which a metre of height is laid over.
+    # Layover of a metre of height, in pixels of level ground.
     layover_px = 1 / (sight.pixel_m * sight.tangent)
 
     def echoes(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
@@ -104,13 +104,13 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
         before = surface[row, np.maximum(col - 1, 0)]
         roof = surface[row, col]
         foot = np.clip(before, lowest[row, col], roof)
-        # Ranges, in pixels of level ground and rising away from the radar; a wall stands at the
-        # near side of its pixel, of which the roof is one long.
+        # Ranges, in pixels of level ground and increasing away from the radar. A wall stands at the
+        # near side of its pixel; the roof is one pixel long.
         own = np.arange(ground.shape[1]) - ground * layover_px
         far, near = (col - 0.5 - height * layover_px for height in (foot, roof))
         first = math.floor(min(float(own.min()), float(near.min(initial=0)))) - 1
         last = math.ceil(max(float(own.max()), float(far.max(initial=0)))) + 1
-        # Pixels whose centres lie in between.
+        # Pixels with centres in between.
         start, stop = (np.ceil(edge - first).astype(np.intp) for edge in (near, far))
         changes = np.zeros((len(ground), last - first + 2), np.int32)
         for at, step in ((start, 2), (start + 1, -1), (stop, -1)):
@@ -122,17 +122,17 @@ def radar_echoes(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
 
 
 def double_bounce(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
-    """Return how many pixels high a wall that faces the radar stands behind each pixel's ground.
+    """Return the height, in pixels, of the wall facing the radar behind each pixel's ground.
 
-    Wall and ground reflect together at the range of the wall's foot, wherever on the wall: if the
-    radar sees its foot, all of it is one bright line there. Shape (h, w); 0: no such wall. Source:
-    [Suri2010].
+    Double bounce between wall and ground has the range of the wall's foot, at any height on the
+    wall. If the radar sees the foot, the whole wall is one bright line there. Shape (h, w); 0: no
+    such wall. Source: [Suri2010].
     """
 
     def lines(surface: _Lines, ground: _Lines) -> NDArray[np.int32]:
         foot, lowest = surface[:, :-1], _lowest_sight_m(surface, ground, sight.rise_m)[:, :-1]
         is_foot = (foot <= ground[:, :-1]) & (foot >= lowest - _LEVEL_M)
-        # Ground that rises is no wall.
+        # Rising ground is no wall.
         is_foot &= surface[:, 1:] > ground[:, 1:]
         found = np.zeros(surface.shape, np.int32)
         high_px = _nearest(np.diff(surface) / sight.pixel_m)
@@ -143,7 +143,7 @@ def double_bounce(heights: Heights, sight: LineOfSight) -> NDArray[np.int32]:
 
 
 def _lowest_sight_m(surface: _Lines, ground: _Lines, rise_m: float) -> _Lines:
-    """Return how high the lowest free line of sight is over each pixel of rays; -inf: all are.
+    """Return the height of the lowest free line of sight over each pixel of rays; -inf: all free.
 
     Rays run away from the sensor along the columns; towards it, a line of sight rises by `rise_m`
     for each pixel. It grazes the far ends of pixels, where the ground lies halfway to the next one.
@@ -158,15 +158,15 @@ def _lowest_sight_m(surface: _Lines, ground: _Lines, rise_m: float) -> _Lines:
 def _along_rays(
     heights: Heights, sight: LineOfSight, function: Callable[[_Lines, _Lines], NDArray[_T]]
 ) -> NDArray[_T]:
-    """Return what a function finds on rays, shape (rays, length), that run away from the sensor.
+    """Return a function's result on rays, shape (rays, length), that run away from the sensor.
 
-    Rays lie a pixel apart, and so do their points: the pixels nearest to them are taken.
+    Rays lie a pixel apart, and so do their points, which take the value of the nearest pixel.
     """
     rows, cols = heights.surface_m.shape
     away = -np.array(sight.towards_px) * sight.pixel_m
     across = np.array([-away[1], away[0]])
     x, y = (np.arange(n) + first for n, first in zip((cols, rows), heights.first_px, strict=True))
-    # Which of the map's rays, and which point of it, each pixel is nearest to.
+    # The nearest of the map's rays, and the nearest point of that ray, for each pixel.
     ray, place = (_nearest(np.add.outer(y * axis[1], x * axis[0])) for axis in (across, away))
     aside, along = (np.arange(at.min(), at.max() + 1) for at in (ray, place))
     col, row = (
@@ -181,5 +181,5 @@ def _along_rays(
 
 
 def _nearest(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the nearest whole numbers; halves go up, wherever the count begins."""
+    """Return the nearest whole numbers; halves are rounded up, independent of the origin."""
     return np.floor(values + 0.5).astype(np.intp)

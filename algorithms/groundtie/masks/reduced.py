@@ -1,4 +1,4 @@
-"""A whole radar image at once, reduced where it is large, and masks that are found in it."""
+"""A whole radar image in memory, reduced if it is large, and masks that are found in it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..speckle.statistics import estimate_looks
 from .radar import power
 from .scene import Scene, Selection
 
-# Larger scenes are reduced to larger pixels.
+# Scenes with more pixels are reduced.
 _MOST_PIXELS = 24_000_000
 
 # Window of the speckle filter.
@@ -25,7 +25,7 @@ _FILTER_PX = 7
 
 @dataclass(frozen=True)
 class BlockMask:
-    """Which blocks of a scene take part.
+    """The blocks of a scene that take part.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class BlockMask:
     blocks: Mask
 
     def cut(self, window: Window) -> Mask:
-        """Return which pixels of a window take part, valid ones and others; none beyond."""
+        """Return the pixels of a window that take part, valid or not; none beyond the scene."""
         rows = np.arange(window.row, window.row + window.height) // self.factor
         cols = np.arange(window.col, window.col + window.width) // self.factor
         height, width = self.blocks.shape
@@ -57,7 +57,7 @@ class BlockMask:
 
 
 def reduction(scene: Scene) -> int:
-    """Return the side of the blocks, in pixels, that a scene is reduced by to fit into memory."""
+    """Return the side of the blocks, in pixels, whose means of a scene fit into memory."""
     return math.ceil(math.sqrt(scene.grid.width * scene.grid.height / _MOST_PIXELS))
 
 
@@ -111,5 +111,5 @@ class ReducedScene:
         return np.asarray(level_db, np.float32), looks
 
     def mask(self, blocks: Mask) -> BlockMask:
-        """Return some of the blocks, shape (h, w), as a mask of the scene."""
+        """Return a selection of blocks, shape (h, w), as a mask of the scene."""
         return BlockMask(self.scene, self.factor, blocks)

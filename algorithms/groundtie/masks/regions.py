@@ -1,7 +1,7 @@
-"""Masks by regions: what is flat and homogeneous, as roads, waters and fields ([Suri2010] 5.3.2).
+"""Masks by regions: flat, homogeneous areas such as roads, waters and fields ([Suri2010] 5.3.2).
 
-Speckle is filtered, regions grow from homogeneous seeds, their shapes separate ground from roofs,
-and long ones are thinned to their skeleton and broadened by a window again.
+Speckle is filtered, regions grow from homogeneous seeds, and their shapes separate ground from
+roofs. Long regions are thinned to their skeleton and broadened again by a window.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .skeleton import pruned, skeleton
 from .threshold import BLOCK_PX, disc, grown
 
 # Window by which skeletons are broadened, 5–19 m in [Suri2010], and percentage of the brightest
-# pixels inside that take no part after all.
+# pixels inside that are excluded again.
 WIDTH_M = 11.0
 HIGH_PERCENT = 10.0
 
-# A region takes in pixels that differ from its seed, which is homogeneous, by so much.
+# Largest difference of a region's pixels from its homogeneous seed.
 _TOLERANCE_DB = 2.5
 
-# Regions: long ones from this length and elongation on, others from this area on.
+# Least area of a region; least length and elongation of long regions; least area of wide ones.
 _SMALLEST_M2 = 200.0
 _LONG_M, _ELONGATION = 50.0, 3.0
 _LARGE_M2 = 1500.0
@@ -44,27 +44,27 @@ _DARKEST_PERCENT = 5.0
 _SHADOW_DB = 1.5
 _LAKE_M2 = 20_000.0
 
-# Borders are made even by this before they are thinned.
+# Radius by which borders are smoothed before thinning.
 _EVEN_M = 2.0
 
-# The surroundings up to this distance take part, too: banks and kerbs are on the ground, and the
-# only structure of a homogeneous area. Gaps up to twice as wide close.
+# Surroundings up to this distance take part, too: banks and kerbs are on the ground, and are the
+# only structure of a homogeneous area. Gaps up to twice this width close.
 _BORDER_M = 3.0
 
 
 @dataclass(frozen=True)
 class GroundRegions:
-    """Homogeneous regions of a radar image that are ground by their shapes and levels.
+    """Homogeneous regions of a radar image that are ground, by their shapes and levels.
 
     Parameters
     ----------
     regions, skeleton, part
-        Homogeneous regions that were kept; the skeleton of the long ones; the mask: the broadened
-        skeleton and the large regions that are wider.
+        The regions that were kept; the skeleton of the long ones; the mask, that is the broadened
+        skeleton and the large, wider regions.
     skeleton_m
         Length of the skeleton.
     high
-        Grey value above which nothing takes part, of means over 4 × 4 pixels of the scene.
+        Largest grey value that takes part, of means over 4 × 4 pixels of the scene.
     """
 
     regions: BlockMask
@@ -95,7 +95,7 @@ def find_regions(
     width_m
         Window by which skeletons are broadened; 5–19 m in [Suri2010].
     high_percent
-        Percentage of the brightest pixels inside that take no part after all.
+        Percentage of the brightest pixels inside that are excluded again.
     progress
         Receives every step.
 
@@ -117,13 +117,13 @@ def find_regions(
 
 
 def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
-    """Return the skeleton with its window, the wide regions, and the border of both."""
+    """Return the broadened skeleton, the wide regions, and the border of both."""
     broad = grown(lines, max(round(width_m / pixel_m / 2), 1))
     return grown(broad | wide, max(round(_BORDER_M / pixel_m), 1))
 
 
 def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tuple[Mask, Mask]:
-    """Return long regions on the ground, and large and wide ones."""
+    """Return the long regions on the ground, and the large, wide ones."""
     valid, pixel_m = image.patch.valid, image.pixel_m
     level, looks = image.without_speckle()
     variation2 = local_statistics(power(image.patch), valid, LOOKS_WINDOW_PX).variation2
@@ -148,7 +148,7 @@ def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tu
 
 
 def _darkest_db(regions: list[Region]) -> float:
-    """Return the level below which a few percent of the regions' area lie."""
+    """Return the level below which `_DARKEST_PERCENT` of the regions' area lie."""
     if not regions:
         return -np.inf
     level = np.array([region.level_db for region in regions])
@@ -159,7 +159,7 @@ def _darkest_db(regions: list[Region]) -> float:
 
 
 def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:
-    """Return a mask with even borders and without holes that are smaller than some pixels."""
+    """Return a mask with smooth borders and without holes smaller than `smallest_px` pixels."""
     even = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(radius_px))
     even = cv2.morphologyEx(even, cv2.MORPH_OPEN, disc(radius_px))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - even, connectivity=4)
@@ -169,13 +169,13 @@ def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:
 
 
 def _smooth(patch: Patch) -> NDArray[np.float32]:
-    """Return the mean over as many pixels around each as in a block; invalid ones count as 0."""
+    """Return the mean over a block's size around each pixel; invalid ones count as 0."""
     known = np.where(patch.valid, patch.values, np.float32(0))
     return np.asarray(cv2.blur(known, (BLOCK_PX, BLOCK_PX)))
 
 
 def _length_px(lines: Mask) -> float:
-    """Return the length of lines one pixel wide: steps along rows and columns, and diagonals."""
+    """Return the length of lines one pixel wide: straight steps and diagonals."""
     straight = np.count_nonzero(lines[1:] & lines[:-1]) + np.count_nonzero(
         lines[:, 1:] & lines[:, :-1]
     )

@@ -1,4 +1,4 @@
-"""Windows of one image, whatever they are read from, and mask rasters made from them."""
+"""Windows of one image, from any source, and mask rasters made from them."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from ..rasters.writing import create_like, one_band
 
 
 class Selection(NamedTuple):
-    """Which pixels of a window take part, and which are valid at all, both of shape (h, w)."""
+    """Pixels of a window that take part, and pixels that are valid, both of shape (h, w)."""
 
     part: Mask
     valid: Mask
 
 
-# What returns which pixels of a window take part.
+# Returns the pixels of a window that take part.
 Select = Callable[[Window], Selection]
 
-# Pixels of the result that are averaged at a time.
+# Number of pixels of the result that are averaged at a time.
 _STRIP_PIXELS = 1 << 18
 
 
 @dataclass(frozen=True)
 class Scene:
-    """An image on a grid, of which windows can be read.
+    """An image on a grid, read in windows.
 
     Parameters
     ----------
     grid
-        Where the pixels lie.
+        Grid of the pixels.
     read
         Returns the image in a window of the grid, which may reach beyond it.
     like
-        A raster whose kind of file masks are written in.
+        A raster whose file format masks are written in.
     """
 
     grid: Grid
@@ -82,10 +82,9 @@ class Scene:
         )
 
     def sample(self, factor: int, most: int, progress: Progress = SILENT) -> NDArray[np.float32]:
-        """Return the valid means over blocks, shape (n,), of large scenes those of some tiles.
+        """Return valid means over blocks, shape (n,), of large scenes about `most` from some tiles.
 
-        So that there are about `most`. The tiles lie along diagonals: each row and column of tiles
-        has as many.
+        The tiles lie along diagonals, so that each row and column of tiles has equally many.
         """
         step = max(self.grid.width * self.grid.height // (factor**2 * most), 1)
         side = BLOCK // factor * factor
@@ -113,7 +112,7 @@ def block_means(patch: Patch, factor: int) -> Patch:
 def sampled_onto(
     grid: Grid, raster: RasterSource, method: str, band: int | None = None
 ) -> tuple[FloatImage, Mask]:
-    """Return a raster of any grid and map on the pixels of another: see `warping.sample`."""
+    """Resample a raster of any grid and map to another grid: see `warping.sample`."""
     return sample(raster, grid, grid.to_pixels_of(raster.grid), method, band)
 
 
@@ -123,16 +122,16 @@ def write_mask(
     select: Select,
     progress: Progress = SILENT,
 ) -> float:
-    """Write a mask raster, 1 where pixels take part and else 0, and return the share of them.
+    """Write a mask raster, 1 where pixels take part, else 0, and return the share of the former.
 
     Parameters
     ----------
     scene
-        Gives the grid.
+        Provides the grid.
     path
         The GeoTIFF to write; see `atomic.Outputs.stage`.
     select
-        Returns which pixels of a tile take part.
+        Returns the pixels of a tile that take part.
     progress
         Receives every tile.
 
@@ -167,11 +166,11 @@ def write_tiles(
     Parameters
     ----------
     scene, path, progress
-        As `write_mask` takes them.
+        As in `write_mask`.
     values
         Returns the pixels of a tile.
     dtype, nodata
-        Of the raster.
+        Data type and nodata value of the raster.
     """
     count = tile_count(scene.grid)
     with create_like(one_band(scene.like, dtype), scene.grid, path, nodata=nodata) as file:

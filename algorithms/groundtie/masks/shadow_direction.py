@@ -1,7 +1,7 @@
-"""The direction in which shadows fall: cast shadows in a camera's image, radar shadow in a radar's.
+"""The direction in which shadows fall: cast shadow in a camera image, radar shadow in a radar one.
 
-It is inferred from the image itself: dark pixels lie beside bright ones more often on the one side
-than on the other.
+It is inferred from the image itself: dark pixels lie more often on one side of bright ones than on
+the other.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ def shadow_azimuth_deg(patch: Patch, outer_percent: float, far_px: int) -> float
     Parameters
     ----------
     patch
-        An image with tall objects: a camera's, or a radar's without speckle, whose shadows fall
-        away from the sensor.
+        An image with tall objects: a camera image, or a despeckled radar image, in which shadows
+        fall away from the sensor.
     outer_percent
-        So many of the pixels, the outer parts of the histogram, are dark, and so many bright.
+        Percentage of the pixels at each end of the histogram that count as dark, or as bright.
     far_px
         Largest distance of dark pixels from bright ones.
     """
     level = cv2.GaussianBlur(patch.values, (0, 0), 1.0)
     low, high = np.percentile(level[patch.valid], [outer_percent, 100 - outer_percent])
     dark, bright = (level <= low) & patch.valid, (level >= high) & patch.valid
-    # How many dark pixels lie at an offset from bright ones.
+    # Number of dark pixels at each offset from bright ones.
     counts = products_at_shifts(bright.astype(np.float32), dark.astype(np.float32), far_px)
     y, x = np.mgrid[-far_px : far_px + 1, -far_px : far_px + 1]
     distance = np.hypot(x, y)
@@ -44,7 +44,7 @@ def shadow_azimuth_deg(patch: Patch, outer_percent: float, far_px: int) -> float
 
 
 def products_at_shifts(image: FloatImage, other: FloatImage, reach_px: int) -> FloatImage:
-    """Return sums of products of an image's pixels with those of another at an offset from them.
+    """Return the sums of products of two images' pixels at each offset of the other one.
 
     Shape (2 r + 1, 2 r + 1): offsets along rows and columns of up to `reach_px` pixels.
     """

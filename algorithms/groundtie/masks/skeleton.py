@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from ..rasters.reading import Mask
 
-# Neighbours in a circle, from the one above, as (down, right).
+# Neighbours in clockwise order from the one above, as (down, right).
 _CIRCLE = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 
 
 def _removable(second: bool) -> NDArray[np.bool_]:
-    """Return for each of the 256 neighbourhoods whether its centre may go in a subiteration."""
+    """Return for each of the 256 neighbourhoods whether a subiteration may remove its centre."""
     codes = np.arange(256)
     p = [(codes >> k) & 1 for k in range(8)]
     count = np.sum(p, axis=0)
@@ -33,7 +33,7 @@ _TABLES = (_removable(False), _removable(True))
 def skeleton(mask: Mask) -> Mask:
     """Thin a mask to lines [Zhang1984].
 
-    Only the remaining border is examined, so that each pixel is touched a few times.
+    Only the current border is examined, so that each pixel is visited only a few times.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ def skeleton(mask: Mask) -> Mask:
 
 
 def pruned(skeleton: Mask, length_px: int) -> Mask:
-    """Return a skeleton whose lines are shorter by some pixels at their free ends.
+    """Return a skeleton with its lines shortened by some pixels at their free ends.
 
-    Spurs up to this length, which every unevenness of a border makes, disappear.
+    This removes spurs up to this length, which arise at every irregularity of a border.
     """
     lines = _Lines.of(skeleton)
     left = np.nonzero(lines.image)[0]
@@ -78,7 +78,7 @@ _NEIGHBOURS = np.array([bin(code).count("1") for code in range(256)])
 
 @dataclass(frozen=True)
 class _Lines:
-    """An image, flat and with a border of 0, and the offsets to a pixel's neighbours."""
+    """A flattened image with a border of 0, and the offsets to a pixel's neighbours."""
 
     image: NDArray[np.uint8]
     around: NDArray[np.int64]
@@ -91,7 +91,7 @@ class _Lines:
         return cls(padded.ravel(), around, padded.shape)
 
     def neighbourhood(self, at: NDArray[np.intp]) -> NDArray[np.int64]:
-        """Return the neighbours of some pixels as bits in the order of `_CIRCLE`."""
+        """Return the neighbours of given pixels as bits in the order of `_CIRCLE`."""
         code = np.zeros(len(at), np.int64)
         for k, offset in enumerate(self.around):
             code |= self.image[at + offset].astype(np.int64) << k

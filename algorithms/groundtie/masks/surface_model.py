@@ -1,7 +1,7 @@
-"""What images show of a surface model, by the geometry of their views: which ground, and what else.
+"""Ground and elevated objects of a surface model that images show, by the geometry of their views.
 
-Elevated objects are imaged elsewhere than their feet, hide ground, and cast shadows. With heights
-and views all of that is computed, and nothing is guessed from grey values.
+Elevated objects are imaged elsewhere than their feet, hide ground, and cast shadows. All of this is
+computed from heights and views, without any inference from grey values.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, rad
 from .scene import Scene, Selection, write_tiles
 from .threshold import grown
 
-# Brightness of shadow, that of ground being 1; what correlates with it hardly depends on it.
+# Brightness of shadow relative to ground; correlation with an image hardly depends on it.
 _SHADOW = np.float32(0.1)
 
-# Echoes that double bounce adds for each pixel of a wall's height. Measured by the suite
-# double_bounce: without, images are registered 1.5 times as far off; more of it gains little.
+# Echoes that double bounce adds for each pixel of a wall's height. Suite double_bounce: without
+# double bounce, the error of the registration is 1.5 times as large; more echoes gain little.
 DOUBLE_BOUNCE = 3.0
 
-# Borders between pixels of the model and of rays are right to a pixel.
+# Borders between pixels of the model and of rays are accurate to one pixel.
 _GROWN_PX = 1
 
 
 class Reason(IntFlag):
-    """Why a pixel of the map takes no part; 0: both images show its ground."""
+    """Reason why a pixel of the map takes no part; 0: both images show its ground."""
 
     RAISED = 1
     LAYOVER = 2
@@ -50,18 +50,18 @@ class Reason(IntFlag):
 
 @dataclass(frozen=True)
 class SurfaceGround:
-    """The ground of a scene that images taken from some views all show.
+    """The ground of a scene that is visible in the images of all given views.
 
     Parameters
     ----------
     scene
-        The image whose pixels are in question; it lies right on the map.
+        The image whose pixels are selected; it is correctly placed on the map.
     model
         The elevated objects on the map.
     views
-        From where the images were taken.
+        Views from which the images were taken.
     offset_px
-        Columns and rows by which the scene shows elevated objects elsewhere than the model has it.
+        Displacement of elevated objects in the scene relative to the model, in columns and rows.
     """
 
     scene: Scene
@@ -86,9 +86,9 @@ class SurfaceGround:
         return reasons[inside]
 
     def level(self, window: Window, view: View) -> FloatImage:
-        """Return the logarithm of what an image from a view may show in a window, shape (h, w).
+        """Return the logarithm of the simulated image from a view in a window, shape (h, w).
 
-        All surfaces are taken for equally bright, radar and cast shadow for darker by 10 dB.
+        All surfaces are assumed equally bright, radar shadow and cast shadow darker by 10 dB.
         """
         heights, _, inside = self._around(window)
         if view.sensor == RADAR:
@@ -100,9 +100,9 @@ class SurfaceGround:
         return np.log(shown[inside] + _SHADOW)
 
     def image(self, window: Window, view: View, bounce: float = DOUBLE_BOUNCE) -> FloatImage:
-        """Return what a radar image from a view may show, as amplitude, (h, w); NaN if not known.
+        """Return the simulated radar amplitude from a view, shape (h, w); NaN where not known.
 
-        `bounce` is how many echoes double bounce adds for each pixel of a wall's height.
+        `bounce` is the number of echoes that double bounce adds for each pixel of a wall's height.
         """
         heights, known, inside = self._around(window)
         lines = double_bounce(heights, _sight(view, self.scene.grid))
@@ -110,24 +110,24 @@ class SurfaceGround:
         return np.where(known[inside], np.sqrt(power), np.float32(np.nan))
 
     def _echoes(self, heights: Heights, view: View) -> NDArray[np.int32]:
-        """Return how many echoes a radar image shows at each pixel, ground among them."""
+        """Return the number of echoes in each pixel of a radar image, including the ground's."""
         sight = _sight(view, self.scene.grid)
         ground = ~hidden_ground(heights, sight) & (heights.surface_m == heights.ground_m)
         return radar_echoes(heights, sight) + ground
 
     def require_cover(self) -> None:
-        """Raise `NoOverlapError` if the model knows nothing of the scene."""
+        """Raise `NoOverlapError` if the model has no heights in the scene."""
         if self._highest_m is None:
             raise NoOverlapError("the surface model does not cover the reference")
 
     def _around(self, window: Window) -> tuple[Heights, Mask, tuple[slice, slice]]:
-        """Return all that matters to a window: heights, where known, and where it lies."""
+        """Return the heights that affect a window, where they are known, and the window in them."""
         longest = max(_longest(view) for view in self.views)
         return self._piece(window, (self._highest_m or 0.0) * longest)
 
     def _piece(self, window: Window, reach_m: float) -> tuple[Heights, Mask, tuple[slice, slice]]:
-        """Return heights with objects so far around, where they are known, and the window."""
-        # Ground is found in cells: they are the same in every window.
+        """Return heights within reach of a window, where they are known, and the window in them."""
+        # Ground is found in cells, which are aligned so that they are the same in every window.
         cell = ground_cell_px(self.scene.grid.pixel_size_m)
         around = (reach_m + GROUND_REACH_M) / self.scene.grid.pixel_size_m
         reach = math.ceil(around) + _GROWN_PX + cell
@@ -135,7 +135,7 @@ class SurfaceGround:
         right, down = self.offset_px
         moved = piece._replace(col=piece.col - right, row=piece.row - down)
         heights, known = self.model.heights(self.scene.grid.window(*moved))
-        # What counts as ground hides nothing.
+        # Objects so low count as ground, which hides nothing.
         is_raised = heights.surface_m - heights.ground_m > LOWEST_M
         surface = np.where(is_raised, heights.surface_m, heights.ground_m)
         first_px = piece.col, piece.row
@@ -143,7 +143,7 @@ class SurfaceGround:
 
     @cached_property
     def _highest_m(self) -> float | None:
-        """Height of the highest object; None if the model knows nothing here."""
+        """Height of the highest object; None if the model has no heights here."""
         highest = []
         for tile in tiles(self.scene.grid):
             heights, known, _ = self._piece(tile, 0.0)
@@ -168,7 +168,7 @@ def write_image(
 
 
 def _longest(view: View) -> float:
-    """Return how many metres of ground a metre of height reaches over, at most."""
+    """Return the longest reach on the ground, in metres, for each metre of height."""
     tangents = [math.tan(math.radians(view.incidence_deg))]
     if view.sensor == RADAR:
         tangents.append(1 / tangents[0])
@@ -178,7 +178,7 @@ def _longest(view: View) -> float:
 
 
 def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Reason, Mask]]:
-    """Return what of the ground an image from a view does not show, and why."""
+    """Return the ground that an image from a view does not show, by reason."""
     sight = _sight(view, grid)
     hidden = hidden_ground(heights, sight)
     if view.sensor == RADAR:

@@ -1,6 +1,6 @@
-"""Masks by grey value: strong scatterers, as walls and double bounces, are masked ([Suri2010] 4.5).
+"""Masks by grey value: strong scatterers (walls, double bounces) are masked ([Suri2010] 4.5).
 
-The thresholds are percentiles of the block-averaged image, where speckle is less; they are applied
+The thresholds are percentiles of the block-averaged image, which has less speckle; they are applied
 to the blocks at full resolution.
 """
 
@@ -20,11 +20,11 @@ from .scene import Scene, Selection, block_means
 # Side of the blocks whose means are compared, in pixels ([Suri2010] 4.5).
 BLOCK_PX = 4
 
-# Masked by default: 20–30 % served best in [Suri2010].
+# Masked by default: 20–30 % gave the best results in [Suri2010].
 HIGH_PERCENT = 20.0
 
-# So many means give the percentiles: scenes of more than 8000 × 8000 px are sampled, as all means
-# would take memory that grows with the scene.
+# Number of means that give the percentiles. Scenes of more than 8000 × 8000 px are sampled, which
+# bounds the memory.
 _MEANS = 4_000_000
 
 
@@ -32,7 +32,7 @@ _MEANS = 4_000_000
 class ThresholdMask:
     """The blocks of a scene whose mean grey values are `low` to `high`.
 
-    What lies up to `grow_px` pixels beside other blocks takes no part, either.
+    Pixels up to `grow_px` beside other blocks take no part, either.
     """
 
     scene: Scene
@@ -49,7 +49,7 @@ class ThresholdMask:
         grow_px: int = 0,
         progress: Progress = SILENT,
     ) -> ThresholdMask:
-        """Return the mask of a scene without some percent of its brightest and darkest blocks.
+        """Return the mask of a scene without given percentages of its brightest and darkest blocks.
 
         Raises
         ------
@@ -69,7 +69,7 @@ class ThresholdMask:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
-        # Whole blocks, and as many around as the mask grows by.
+        # Whole blocks, and their surroundings into which the mask grows.
         around = window.widened(self.grow_px).aligned(BLOCK_PX)
         patch = self.scene.read(around)
         means = block_means(patch, BLOCK_PX)
@@ -81,7 +81,7 @@ class ThresholdMask:
 
 
 def grown(mask: Mask, distance_px: int) -> Mask:
-    """Return a mask with all pixels within a distance of it, shape (h, w)."""
+    """Return a mask extended by all pixels within a distance of it, shape (h, w)."""
     if distance_px == 0:
         return mask
     return np.asarray(cv2.dilate(mask.astype(np.uint8), disc(distance_px)) > 0)

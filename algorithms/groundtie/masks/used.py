@@ -1,19 +1,19 @@
-"""Which mask of the ground a registration used."""
+"""The ground mask that a registration used."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# Kinds of masks: none, the ground of a town that its radar image shows beside a camera's, the
-# ground between forests and settlements of two radar images, what a vector layer covers, and the
-# ground that both images show by a surface model.
+# Kinds of masks: none; the ground of a town, found in the radar image of a radar and a camera
+# image; the ground between forests and settlements of two radar images; the area that a vector
+# layer covers; the ground that both images show according to a surface model.
 NONE, GROUND, OPEN = "none", "ground", "open ground"
 LAYER, SURFACE = "layer", "surface"
 
-# Where less than this share takes part, chips have too few pixels for a joint histogram of their
-# own. Of simulated cities up to 42 % is ground, in pixels of 2 m and 3 m: each chip by itself was
-# 1.3 px off (median), one histogram of all 0.5 px (suite calibration, class city, 2 m).
+# If less than this share takes part, chips have too few pixels for a joint histogram of their own.
+# Up to 42 % of simulated cities is ground, in pixels of 2 m and 3 m. Median errors: 1.3 px with a
+# histogram for each chip, 0.5 px with a pooled histogram (suite calibration, class city, 2 m).
 _LITTLE = 0.5
 
 REFERENCE, INPUT = "reference", "input"
@@ -21,23 +21,23 @@ REFERENCE, INPUT = "reference", "input"
 
 @dataclass(frozen=True)
 class MaskUsed:
-    """The mask of the ground that was used; what users mask besides is noted at their images.
+    """The ground mask that was used; masks given by users are recorded with their images.
 
     Parameters
     ----------
     kind
         `NONE`, `GROUND`, `OPEN`, `LAYER` or `SURFACE`.
     image
-        Which image was masked: "reference" or "input"; None without a mask.
+        The image that was masked: "reference" or "input"; None without a mask.
     share
         Share of the pixels that take part.
     reason
-        Why, in a sentence.
+        The reason for the choice, in a sentence.
     is_reliable
         Whether the image shows the elevated objects of the surface model, if that was used.
     elevated_px
-        What elevated objects among what takes part displace all points alike by, as far as that is
-        known: the standard deviation along an axis, in matching pixels.
+        Common displacement of all points by elevated objects that take part, as far as known: the
+        standard deviation along an axis, in matching pixels.
     """
 
     kind: str
@@ -49,17 +49,17 @@ class MaskUsed:
 
     @classmethod
     def none(cls, reason: str, elevated_px: float = 0.0) -> MaskUsed:
-        """Return that no mask was used, and why."""
+        """Return the record of a registration without a mask, with the reason."""
         return cls(NONE, None, 1.0, reason, elevated_px=elevated_px)
 
     @property
     def is_ground(self) -> bool:
-        """Whether nothing but ground takes part, as far as the mask is right."""
+        """Whether only ground takes part, if the mask is right."""
         return self.kind in (GROUND, LAYER, SURFACE)
 
     @property
     def leaves_little(self) -> bool:
-        """Whether chips of what takes part are too poor to be matched each by itself."""
+        """Whether too few pixels of a chip take part to match each chip by itself."""
         return self.share < _LITTLE
 
     def summary(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Which values of a mask take no part: numbers, or the meaning that missions give them."""
+"""Values of a mask that take no part: numbers, or classes that missions define."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.warping import reduction
 from .scene import Scene, Selection
 
-# What a vector layer is if it shows what takes no part.
+# Stands for the values of a vector layer that covers the area which takes no part.
 INSIDE = "inside"
 
 _RANGE = re.compile(r"\s*(\d{1,9})\s*(?:-\s*(\d{1,9})\s*)?")
@@ -39,7 +39,7 @@ class MaskValues:
     bits: int = 0
 
     def excluded(self, values: NDArray[Any]) -> Mask:
-        """Return which of these values, of any shape, take no part; those that are no numbers."""
+        """Return which values, of any shape, take no part; among them all that are not finite."""
         whole = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).astype(np.int64)
         found = ~np.isfinite(values) | ((whole & self.bits) != 0)
         for first, last in self.ranges:
@@ -56,8 +56,8 @@ SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
         "qa-pixel": MaskValues(bits=0b11111),
         # Fmask: shadow, cloud, no observation [Zhu2012].
         "fmask": MaskValues(((2, 2), (4, 4), (255, 255))),
-        # Harmonized Landsat Sentinel-2: cirrus, cloud, beside them, shadow [Claverie2018]; fill is
-        # all bits.
+        # Harmonized Landsat Sentinel-2: cirrus, cloud, adjacent to either, shadow [Claverie2018];
+        # fill has all bits set.
         "hls-fmask": MaskValues(bits=0b1111),
         # Planet's usable data mask: its first band is 0 where the ground is hidden [Planet2022].
         "udm2": MaskValues(((0, 0),)),
@@ -66,12 +66,12 @@ SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
 
 
 def mask_values(text: str) -> MaskValues:
-    """Return the values that a text means: a scheme's name, or numbers as in 3,8-10.
+    """Return the values that a text stands for: a scheme's name, or numbers such as 3,8-10.
 
     Raises
     ------
     ParameterError
-        It is neither.
+        The text is neither.
     """
     scheme = SCHEMES.get(text.strip().lower().replace("_", "-"))
     if scheme is not None:
@@ -92,16 +92,16 @@ def mask_values(text: str) -> MaskValues:
 
 @dataclass(frozen=True)
 class RasterMask:
-    """The part of a scene where a mask has none of some values; beyond the mask nothing is.
+    """The part of a scene that a mask covers with none of the given values.
 
     Parameters
     ----------
     scene
         The image.
     mask
-        The raster, whose first band counts. What it states as nodata is a value as any other.
+        The raster, whose first band counts. Its nodata value is treated like any other value.
     values
-        What takes no part.
+        Values that take no part.
     """
 
     scene: Scene

@@ -1,1 +1,1 @@
-"""Rotation, scale and shift between two images beyond what georeferencing gives."""
+"""Rotation, scale and shift between two images beyond their georeferencing."""

@@ -1,4 +1,4 @@
-"""Rotation, scale and shift between two images, and what a search for them returns."""
+"""Rotation, scale and shift between two images, and the candidates of a search for them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Pose:
-    """How an image lies against another: rotated and scaled about its centre, then shifted.
+    """Pose of an image relative to another: rotation and scale about its centre, then a shift.
 
     A point that lies (x, y) pixels right of and below the reference's centre lies at
     scale · R (x, y) + shift right of and below the input's centre.
@@ -19,10 +19,10 @@ class Pose:
     Parameters
     ----------
     rotation_deg
-        By how much the input's content is rotated against the reference's, counter-clockwise as
-        seen on the screen.
+        Rotation of the input's content relative to the reference's, counter-clockwise as seen on
+        the screen.
     scale
-        How many input pixels a reference pixel is long.
+        Length of a reference pixel in input pixels.
     shift_px
         (right, down), in input pixels.
     """
@@ -57,11 +57,11 @@ class PoseFound:
     Parameters
     ----------
     pose
-        Where the input lies.
+        Pose of the input.
     height
         Height of the peak, in robust standard deviations of its background.
     evaluations
-        How often similarity was evaluated until it was found; 0 if the search does not count.
+        Number of similarity evaluations until it was found; 0 if the search does not count them.
     """
 
     pose: Pose

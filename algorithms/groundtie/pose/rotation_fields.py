@@ -19,14 +19,14 @@ from .pose import Pose
 
 Spectrum = NDArray[np.complex64]
 
-# What all of an image has in common, such as the direction of its fields, matches anywhere: it
-# is taken off as the field's Gaussian mean of this width, in pixels of the level.
+# Structure that a whole image shares, such as the direction of its fields, matches anywhere. It is
+# subtracted as the field's Gaussian mean of this width, in pixels of the level.
 _TREND_PX = 8.0
 
-# Below this share of the largest possible overlap, weights of smaller ones no longer grow.
+# Below this share of the largest possible overlap, the weight no longer grows.
 _SMALL_OVERLAP = 0.2
 
-# Energies vary slowly, and are summed up over squares of this side.
+# Energies vary slowly, and are averaged over squares of this side.
 _COARSE = 4
 
 
@@ -75,10 +75,10 @@ class Field:
         return float(filled.mean()) if filled.size else 0.0
 
     def resampled(self, reference: Field, pose: Pose, border: int) -> FloatImage:
-        """Return the field as it lies on a reference's pixels if the input has a pose.
+        """Return the field of an input with this pose, resampled to a reference's pixels.
 
-        Shape (h + 2 border, w + 2 border, 2). The gradient's directions rotate with the image; as
-        the field is its square, they rotate by twice the angle, which is left to the caller.
+        Shape (h + 2 border, w + 2 border, 2). The gradient rotates with the image, and its square,
+        the field, by twice the angle; that rotation is left to the caller.
         """
         linear = pose.linear * reference.pixel_px / self.pixel_px
         shape = [side + 2 * border for side in reference.shape]
@@ -93,7 +93,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Template:
-    """A reference's field, ready to be found within a radius.
+    """A reference's field, prepared for a search within a radius.
 
     Parameters
     ----------
@@ -107,33 +107,33 @@ class Template:
     radius: int
 
     def surface(self, input: Field, pose: Pose) -> Surface:
-        """Return how well the input matches around a pose, in standard deviations of chance.
+        """Return the similarity surface around a pose, in standard deviations of chance.
 
         Parameters
         ----------
         input
             The input's field, about as fine as the reference's at this pose.
         pose
-            Where the input is thought to lie.
+            The assumed pose of the input.
 
         Returns
         -------
         Shape (2 radius + 1, 2 radius + 1): further shift of the input's content, down and right
-        as seen in the reference's pixels. Correlations are divided by what they would be on
-        average if the fields' directions were random in every pixel.
+        in the reference's pixels. Correlations are divided by their standard deviation for fields
+        whose directions are random in every pixel.
         """
         spectra, energy = self._spectra_of(input, pose)
         correlation = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
         return correlation * self._weights(energy, input.density)
 
     def surfaces_both_ways(self, input: Field, pose: Pose) -> tuple[Surface, Surface]:
-        """Return the surfaces around a pose without shift, and around it rotated by 180° more.
+        """Return the surfaces around a pose without shift, and around that pose plus 180°.
 
         An image rotated by 180° has the conjugate spectrum.
         """
         spectra, energy = self._spectra_of(input, pose)
         upright = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
-        # The last pixel has become the first.
+        # Rotation by 180° makes the last pixel the first.
         top, left = (
             n - side - 2 * self.radius + 1
             for n, side in zip(self._shape, self.field.shape, strict=True)
@@ -146,7 +146,7 @@ class Template:
         )
 
     def _spectra_of(self, input: Field, pose: Pose) -> tuple[Spectrum, FloatImage]:
-        """Return the spectra of the input's parts as they lie at a pose, and its coarse energy."""
+        """Return the spectra of the input's parts, resampled by a pose, and its coarse energy."""
         parts = input.resampled(self.field, pose, self.radius)
         spectra = scipy.fft.rfft2(parts, self._shape, axes=(0, 1))
         return np.asarray(spectra), _coarse(_energy(parts))
@@ -179,13 +179,13 @@ class Template:
 
     @cached_property
     def _between(self) -> FloatImage:
-        """Matrix of linear interpolation from every `_COARSE`-th shift to all of them."""
+        """Matrix of linear interpolation from every `_COARSE`-th shift to all shifts."""
         nodes = np.arange(2 * self.radius // _COARSE + 1)
         at = np.arange(self._span)[:, None] / _COARSE - nodes
         return np.maximum(1 - np.abs(at), 0).astype(np.float32)
 
     def _correlation(self, spectra: Spectrum, rotation_deg: float) -> FloatImage:
-        # Directions rotate with the image; those of the square, by twice the angle.
+        # Gradients rotate with the image, their squares by twice the angle.
         angle = 2 * np.radians(rotation_deg)
         cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
         real, imaginary = self._spectra
@@ -194,7 +194,7 @@ class Template:
         return np.asarray(scipy.fft.irfft2(product, self._shape))
 
     def _weights(self, coarse: FloatImage, density: float) -> FloatImage:
-        """Return one over the standard deviation of chance over shifts."""
+        """Return the reciprocal standard deviation of chance at each shift."""
         product = self._energy_spectrum * scipy.fft.rfft2(coarse, self._energy_shape)
         count = self._between.shape[1]
         sums = scipy.fft.irfft2(product, self._energy_shape)[:count, :count] * _COARSE**2
@@ -208,7 +208,7 @@ def _energy(parts: FloatImage) -> FloatImage:
 
 
 def _coarse(energy: FloatImage) -> FloatImage:
-    """Return means over squares, which start at the first pixel; beyond the border is nothing."""
+    """Return means over squares that start at the first pixel; 0 beyond the border."""
     kernel = (_COARSE, _COARSE)
     means = cv2.blur(energy, kernel, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT)
     return np.ascontiguousarray(means[::_COARSE, ::_COARSE])

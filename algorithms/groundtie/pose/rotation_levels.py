@@ -1,4 +1,4 @@
-"""Both images at one pixel size, and how well they match at poses."""
+"""Fields of both images at one pixel size, and their similarity at poses."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .rotation_fields import Field, Template
 # Peaks of one surface that are nearer than 4 pixels of the level are the same.
 _SAME = cv2.circle(np.zeros((9, 9), np.uint8), (4, 4), 4, 1, -1) > 0
 
-# How far a candidate may be off on the next finer level, in its pixels; even.
+# Largest error of a candidate on the next finer level, in pixels of that level; even.
 _NEAR_PX = 4
 
-# How often the steps are halved on the finest level, and how many of them are taken at most.
+# How often the steps are halved on the finest level, and the largest number of steps of each size.
 _HALVINGS = 3
 _CLIMBS = 3
 
 HEIGHT = attrgetter("height")
 
-# Inputs are reduced to these steps of scale (log2); what is left of it is interpolated.
+# Inputs are reduced in these steps of scale (log2); the rest of the scale is interpolated.
 _INPUT_STEP = 0.25
 
 
@@ -45,7 +45,7 @@ class Level:
     reference
         Field of the reference.
     inputs
-        Fields of the input by the scales at which they are as fine as the reference's.
+        Fields of the input, by the scale at which they are as fine as the reference's.
     """
 
     reference: Field
@@ -60,7 +60,7 @@ class Level:
         scales: Iterable[float],
         context: Context,
     ) -> Level:
-        """Return the level for a pixel size in reference pixels; `scales` will be asked for."""
+        """Return the level for a pixel size in reference pixels, with fields for `scales`."""
         near = sorted({_near(scale) for scale in scales})
         fields = context.map(lambda scale: Field.of(input, pixel_px * scale), near)
         return cls(Field.of(reference, pixel_px), dict(zip(near, fields, strict=True)))
@@ -71,11 +71,11 @@ class Level:
         return self.reference.pixel_px
 
     def input(self, scale: float) -> Field:
-        """Return the input's field that is as fine as the reference's at a scale, or nearly so."""
+        """Return the input's field that is nearest in fineness to the reference's at a scale."""
         return self.inputs[min(self.inputs, key=lambda known: abs(np.log(known / scale)))]
 
     def surface(self, template: Template, pose: Pose) -> Surface:
-        """Return how well the images match around a pose (see `Template.surface`)."""
+        """Return the similarity surface around a pose (see `Template.surface`)."""
         return template.surface(self.input(pose.scale), pose)
 
     def best(self, template: Template, pose: Pose) -> PoseFound:
@@ -88,13 +88,13 @@ class Level:
         Parameters
         ----------
         surface
-            Matches around `pose`, shape (2 r + 1, 2 r + 1); it is overwritten.
+            Surface around `pose`, shape (2 r + 1, 2 r + 1); it is overwritten.
         pose
-            What the surface's shifts are added to.
+            Pose to which the surface's shifts are added.
         radius_px
             Largest shift of the poses along rows and columns, in input pixels.
         count
-            How many peaks are wanted.
+            Number of peaks.
         """
         radius = surface.shape[0] // 2
         linear = pose.linear * self.pixel_px
@@ -111,7 +111,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Climber:
-    """Looks for better poses nearby: steps of rotation (degrees) and of log2 of the scale."""
+    """Search for better poses nearby, in steps of rotation (degrees) and of log2 of the scale."""
 
     level: Level
     rotation: float
@@ -123,7 +123,7 @@ class Climber:
         return Template(self.level.reference, _NEAR_PX)
 
     def climb(self, start: PoseFound) -> PoseFound:
-        """Return the best of a candidate and its neighbours, tried on this level."""
+        """Return the best of a candidate and its neighbours on this level."""
         return max(self.around(start.pose).values(), key=HEIGHT)
 
     def climb_finely(self, start: PoseFound) -> PoseFound:
@@ -170,7 +170,7 @@ def _near(scale: float) -> float:
 def _within(
     linear: NDArray[np.float64], shift_px: tuple[float, float], radius: int, radius_px: float
 ) -> NDArray[np.bool_]:
-    """Return at which shifts of a surface the input's shift is within limits, to half a pixel."""
+    """Return the shifts of a surface at which the input's is within limits, to half a pixel."""
     across = np.arange(-radius, radius + 1)
     largest = radius_px + np.sqrt(np.abs(np.linalg.det(linear))) / 2
     return np.logical_and.reduce(
@@ -182,7 +182,7 @@ def _within(
 
 
 def _between(surface: Surface, row: int, col: int) -> tuple[float, float, float]:
-    """Return how far (x, y) a peak lies from the highest value, and its height there."""
+    """Return the sub-pixel offset (x, y) of a peak from the highest value, and its height."""
     top, last = float(surface[row, col]), surface.shape[0] - 1
     if not (0 < row < last and 0 < col < last):
         return 0.0, 0.0, top
@@ -192,7 +192,7 @@ def _between(surface: Surface, row: int, col: int) -> tuple[float, float, float]
 
 
 def parabola(values: Iterable[float]) -> tuple[float, float]:
-    """Return where the parabola through three values has its top, and how far above the middle.
+    """Return the vertex of the parabola through three values, and its height above the middle one.
 
     The position is between -0.5 and 0.5 if the middle value is the largest.
     """

@@ -1,4 +1,4 @@
-"""Two rasters as windows whose pose is searched for, reduced and with a common nominal centre."""
+"""Windows of two rasters for the search for a pose, reduced and with a common nominal centre."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from ..rasters.pair import Image, require_content, require_georeferenced_alike
 from ..rasters.patch import Patch
 from .pose import Pose
 
-# The longer side of windows, in pixels: what is larger is averaged.
+# Longest side of windows, in pixels; larger ones are averaged.
 LONGEST_PX = 512
 
-# How far the input may be off by default, as a share of its longer side.
+# Default of the input's largest displacement, as a share of its longer side.
 DEFAULT_RADIUS_SHARE = 0.25
 
 
 @dataclass(frozen=True)
 class PoseWindows:
-    """Reference and input at their nominal places: of equal pixels, north up.
+    """Reference and input at their nominal places, with pixels of one size, north up.
 
-    Images without georeferencing are taken to have equal pixels and a common centre.
+    Images without georeferencing are assumed to have pixels of one size and a common centre.
 
     Parameters
     ----------
     reference, input
-        The windows; they have one centre.
+        The windows; their centres coincide.
     reference_grid, input_grid
-        Where their pixels lie on the reference's map.
+        Grids of their pixels on the reference's map.
     nominal
         Reference map position → input pixel position, by the georeferencing.
     radius_m
-        How far the input may be off.
+        Largest displacement of the input.
     """
 
     reference: Patch
@@ -57,15 +57,15 @@ class PoseWindows:
 
     @property
     def is_georeferenced(self) -> bool:
-        """Whether the images are."""
+        """Whether the images are georeferenced."""
         return self.nominal.input_grid.is_georeferenced
 
     def limits(self, rotation_deg: float, scale: tuple[float, float]) -> SearchLimits:
-        """Return the limits of a search in these windows, in their pixels."""
+        """Return the limits of a search in these windows, in window pixels."""
         return SearchLimits(self.radius_m / self.pixel_m, rotation_deg, scale)
 
     def transform(self, pose: Pose) -> Transform:
-        """Return the transform between the rasters if the windows have a pose to one another."""
+        """Return the transform between the rasters that follows from a pose of the windows."""
         shapes = [(grid.height, grid.width) for grid in (self.reference_grid, self.input_grid)]
         moved = apply_affine(pose.between(shapes[0], shapes[1]), self.reference_grid.outline(4))
         xy = self.reference_grid.pixel_to_map(self.reference_grid.outline(4))
@@ -93,7 +93,7 @@ def read_windows(
     radius_m: float | None = None,
     held_out: MaskOf | None = None,
 ) -> PoseWindows:
-    """Read what two images may have in common.
+    """Read the parts of two images that may show common ground.
 
     Parameters
     ----------
@@ -102,18 +102,19 @@ def read_windows(
     scale
         Smallest and largest scale that will be searched for.
     radius_m
-        How far the input may lie from its nominal place; None: a quarter of its longer side.
+        Largest distance of the input from its nominal place; None: a quarter of its longer side.
     held_out
-        Returns for a piece of the grid which pixels of the reference take no part; None: all do.
+        Returns the pixels of the reference in a piece of the grid that take no part; None: all
+        pixels take part.
 
     Raises
     ------
     GeoreferencingError
         Only one of the images is georeferenced.
     NoOverlapError
-        They do not show common ground.
+        The images do not show common ground.
     RasterContentError
-        One of them is constant or has no valid pixel, maybe by its mask.
+        One of the images is constant or has no valid pixel, maybe because of its mask.
     """
     nominal = _nominal(reference, input)
     own = reference.source.grid
@@ -125,7 +126,7 @@ def read_windows(
     nominal_low, nominal_high = _box(frame, outline)
     side = float((nominal_high - nominal_low).max())
     radius = DEFAULT_RADIUS_SHARE * side if radius_m is None else radius_m
-    # However it is rotated, the input shows no more of the reference than this.
+    # The input, at any rotation, covers no more of the reference than this.
     reach = float(np.hypot(*(nominal_high - nominal_low))) / 2 / scale[0] + radius
     middle = (nominal_low + nominal_high) / 2
     low, high = np.maximum(low, middle - reach), np.minimum(high, middle + reach)
@@ -137,7 +138,7 @@ def read_windows(
     longest = 2 * max(half.max(), around.max() / np.sqrt(scale[0] * scale[1]))
     pixel = max(own.pixel_size_m, nominal.input_grid.pixel_size_m, longest / LONGEST_PX)
     grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
-    # Larger by their last, incomplete pixels, windows still have one centre.
+    # Both windows grow by incomplete pixels on all sides, so that their centres still coincide.
     hidden = None if held_out is None else held_out(grids[0])
 
     def of_reference(image: Image) -> Patch:
@@ -165,7 +166,7 @@ def _nominal(reference: Image, input: Image) -> Transform:
 
 
 def _metric_frame(grid: Grid) -> Affine:
-    """Return the transform from metres right and down of a grid's centre to its map."""
+    """Return the transform from metres right of and below a grid's centre to its map."""
     x, y = grid.pixel_to_map([grid.centre_px])[0]
     across, along = grid.metres_per_unit
     down = -1 if grid.is_georeferenced else 1
@@ -173,13 +174,13 @@ def _metric_frame(grid: Grid) -> Affine:
 
 
 def _box(frame: Affine, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper limits of map positions, in metres right and down."""
+    """Return the lower and upper limits of map positions, in metres (right, down)."""
     metres = apply_affine(~frame, xy)
     return metres.min(axis=0), metres.max(axis=0)
 
 
 def _grid(frame: Affine, like: Grid, centre: FloatArray, half: FloatArray, pixel: float) -> Grid:
-    """Return the grid of square pixels around a centre that covers a box of half its size."""
+    """Return the grid of square pixels that covers a box, given by its centre and half its size."""
     width, height = np.maximum(np.ceil(2 * half / pixel - 1e-6), 1).astype(int)
     left, top = centre - np.array([width, height]) * pixel / 2
     corner = compose(frame, Affine.translation(left, top), Affine.scale(pixel))

@@ -1,9 +1,10 @@
 """The exhaustive search for a pose: all rotations and scales in steps, all shifts at once.
 
-Coarse to fine: every rotation and scale is tried on small images; the best candidates are tried
-again in finer steps on larger ones, and compared with one another on the way. Similarity is the
-correlation of squared orientation fields, which is quick over all shifts, and does not depend on
-contrast, which differs between SAR and optical images. Source: [Patel2017], section 3.2.2.
+The search runs from coarse to fine: every rotation and scale is tried on small images; the best
+candidates are refined in finer steps on larger images, and compared with one another on the way.
+Similarity is the correlation of squared orientation fields. It is quick over all shifts and does
+not depend on contrast, which differs between SAR and optical images. Source: [Patel2017],
+section 3.2.2.
 """
 
 from __future__ import annotations
@@ -25,37 +26,38 @@ from .pose import Pose, PoseFound
 from .rotation_fields import Template
 from .rotation_levels import HEIGHT, Climber, Level
 
-# Side of the small images on which all is tried, in pixels: the geometric mean of both images'.
+# Side of the small images on which all poses are tried, in pixels (geometric mean of both images).
 _COARSE_SIDE_PX = 96
 
-# How many candidates are tried again on each finer level, of half the pixel size. More levels do
+# Number of candidates that are refined on each finer level, of half the pixel size. More levels do
 # not change the result.
 _KEPT = (32, 8)
 
-# A step of rotation moves what lies a quarter of the side off the centre by this, in pixels; with a
-# third more, fine structure slips through. Fields are less sensitive to scale by a quarter.
+# Displacement by one step of rotation at a quarter of the side from the centre, in pixels; steps a
+# third larger miss fine structure. Fields are less sensitive to scale by a quarter.
 _STEP_PX = 1.7
 _SCALE_STEP = 1.25
 
 # Poses are the same if they move the reference's corners by less than this share of its side.
 _SAME_SHARE = 0.06
 
-# Radius of the surface whose spread is the height of chance, in pixels of the finest level; even.
+# Radius of the surface whose spread is one standard deviation of chance, in pixels of the finest
+# level; even.
 _BACKGROUND_PX = 32
 
 
 @dataclass(frozen=True)
 class Scan:
-    """How well the input matches at every rotation and scale, on small images.
+    """Heights of the best matches at every rotation and scale, on small images.
 
     Parameters
     ----------
     rotations_deg, scales
-        The steps, rising, shapes (r,) and (s,).
+        The steps, ascending, shapes (r,) and (s,).
     heights
-        The best of all shifts, in standard deviations of chance, shape (s, r).
+        Height at the best of all shifts, in standard deviations of chance, shape (s, r).
     found
-        The best candidates, best first; their height is that of `heights`.
+        The best candidates, best first; their heights are in the unit of `heights`.
     """
 
     rotations_deg: FloatArray
@@ -70,14 +72,14 @@ def find_poses(
     limits: SearchLimits,
     context: Context,
 ) -> list[PoseFound]:
-    """Return how an input window may lie against a reference window, best first.
+    """Return candidates for the pose of an input window in a reference window, best first.
 
     Parameters
     ----------
     reference, input
         The windows; their sizes may differ, their centres are compared.
     limits
-        Within which rotation, scale and shift (in input pixels) are searched for.
+        Limits of the searched rotation, scale and shift (in input pixels).
     context
         Threads to work in.
 
@@ -99,7 +101,7 @@ def scan(reference: Patch, input: Patch, limits: SearchLimits, context: Context)
 def shift_surface(
     reference: Patch, input: Patch, pose: Pose, context: Context
 ) -> tuple[Surface, float]:
-    """Return how well images match around a pose, and the surface's pixel in reference pixels.
+    """Return the similarity surface around a pose, and its pixel size in reference pixels.
 
     The surface has the shape (2 r + 1, 2 r + 1); its values are robust standard deviations.
     """
@@ -111,7 +113,7 @@ def shift_surface(
 
 
 def moved_px(one: Pose, other: Pose, shape: tuple[int, int]) -> float:
-    """Return how far two poses put the corners of a reference apart, in reference pixels (RMS)."""
+    """Return the distance of a reference's corners under two poses, in reference pixels (RMS)."""
     rows, cols = shape
     corners = np.array([[x, y] for x in (-cols / 2, cols / 2) for y in (-rows / 2, rows / 2)])
     apart = corners @ (one.linear - other.linear).T + np.subtract(one.shift_px, other.shift_px)
@@ -173,7 +175,7 @@ class _Search:
     def scan(self) -> Scan:
         rotations, scales = self.rotations_deg(), self.scales()
         level = self.level(self.coarse_px, scales)
-        # A second one shows what repeats; a search that has few steps finds several at each.
+        # A second peak reveals repetitive structure; a search with few steps keeps several at each.
         peaks = max(2 * _KEPT[0] // (len(rotations) * len(scales)), 2)
 
         def at_scale(scale: float) -> list[list[PoseFound]]:
@@ -185,7 +187,7 @@ class _Search:
                 level.peaks(surface, pose, self.limits.radius, peaks) for surface, pose in pairs
             ]
 
-        # Every registration imports this module; few search poses.
+        # Every registration imports this module, but few search for poses.
         from scipy.ndimage import maximum_filter
 
         rows = list(self.context.map(at_scale, scales.tolist()))
@@ -223,13 +225,13 @@ class _Search:
         """Return the radius in pixels of a level that covers all shifts at a scale; even."""
         own, other = max(self.reference.values.shape), max(self.input.values.shape) / scale
         useful = (own + other) / 2 - MINIMUM_OVERLAP * min(own, other)
-        # The limits are along the input's rows and columns, which may lie across.
+        # The limits are along the input's rows and columns, which may be rotated.
         across = np.radians(min(self.limits.rotation_deg, 45.0))
         wanted = self.limits.radius / scale * (np.cos(across) + np.sin(across))
         return 2 * int(np.ceil(min(wanted, useful) / level.pixel_px / 2))
 
     def distinct(self, candidates: Iterable[PoseFound]) -> list[PoseFound]:
-        """Return candidates, best first, without those nearly the same as a better one."""
+        """Return candidates, best first, without near duplicates of a better one."""
         kept: list[PoseFound] = []
         least = _SAME_SHARE * self.side_px
         shape = self.reference.values.shape[0], self.reference.values.shape[1]

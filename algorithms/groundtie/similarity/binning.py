@@ -19,7 +19,7 @@ _SAMPLE = 65_536
 def bin_edges(
     known: NDArray[np.float32], bins: int, binning: str = "equal-frequency"
 ) -> NDArray[np.float32]:
-    """Return the inner edges between bins of values, (n,), shape (bins - 1,).
+    """Return the inner edges between the bins of values, (n,), shape (bins - 1,).
 
     Equal-frequency edges are quantiles of the values; linear ones divide their range evenly.
     """
@@ -44,7 +44,7 @@ def to_bins(
     Parameters
     ----------
     values, valid
-        Grey values and which of them count, shape (…, h, w).
+        Grey values and their validity, shape (…, h, w).
     bins
         Number of bins, 2 to 255, of equally many pixels in each image.
     binning

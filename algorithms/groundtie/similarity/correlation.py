@@ -17,10 +17,10 @@ from .stacks import each
 
 _ZERO = cv2.BORDER_CONSTANT
 
-# Overlaps of a smaller share of the template's pixels are not compared.
+# Shifts at which a smaller share of the template's pixels overlaps are not compared.
 MINIMUM_OVERLAP = 0.3
 
-# Variances count where rounding is at most this share of them: half the digits of single precision.
+# Variances count if rounding is at most this share of them: half the digits of single precision.
 _ROUNDING = math.sqrt(np.finfo(np.float32).eps)
 
 
@@ -49,16 +49,16 @@ def fast_shape(search: NDArray[Any]) -> tuple[int, int]:
 
 
 def tight_shape(template: NDArray[Any], filled: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return a shape that is quicker still, where empty ends of a search window lie on one another.
+    """Return a quicker shape still, in which empty ends of a search window wrap onto each other.
 
-    For whole numbers: sums of others have other last digits in another shape.
+    For whole numbers only: sums of other values change their last digits with the shape.
 
     Parameters
     ----------
     template
-        As `correlate`.
+        As in `correlate`.
     filled
-        Where the search window is not 0.
+        Pixels of the search window that are not 0.
     """
     rows, cols = (_fast_length(filled.shape[k] - _empty(template, filled, k)) for k in (-2, -1))
     return rows, cols
@@ -72,26 +72,26 @@ def _fast_length(least: int) -> int:
 
 
 def _empty(template: NDArray[Any], filled: NDArray[np.bool_], axis: int) -> int:
-    """Return how many lines are empty at each end of a search window, as far as is of use."""
+    """Return how many lines are empty at both ends of a search window and can be left out."""
     size, own = filled.shape[axis], template.shape[axis]
     if filled.take([0, -1], axis).any():
         return 0
     others = tuple(k for k in range(-filled.ndim, 0) if k != axis)
     lines = np.flatnonzero(filled.any(axis=others))
     ends = (lines[0], size - 1 - lines[-1]) if lines.size else (size, size)
-    # The template and the shifts need their room, too.
+    # The shape must still hold the template and all shifts.
     return int(min(*ends, size - own, own - 1))
 
 
 def spans(template: NDArray[Any], search: NDArray[Any]) -> tuple[int, int]:
-    """Return at how many shifts of rows and columns a template lies inside a search window."""
+    """Return the numbers of shifts along rows and columns that keep a template inside a window."""
     (own_rows, own_cols), (rows, cols) = template.shape[-2:], search.shape[-2:]
     return rows - own_rows + 1, cols - own_cols + 1
 
 
 def spectrum(images: NDArray[Any], shape: tuple[int, int], workers: int = 1) -> NDArray[Any]:
-    """Return spectra of images, (…, h, w), filled up with 0 to a shape; half if images are real."""
-    # Rows that hold nothing are not transformed.
+    """Return spectra of images, (…, h, w), zero-padded to a shape; half spectra of real images."""
+    # Rows of padding are not transformed.
     transform = scipy.fft.fft if np.iscomplexobj(images) else scipy.fft.rfft
     along_rows = transform(images, shape[1], workers=workers)
     return scipy.fft.fft(along_rows, shape[0], axis=-2, overwrite_x=True, workers=workers)
@@ -100,11 +100,11 @@ def spectrum(images: NDArray[Any], shape: tuple[int, int], workers: int = 1) -> 
 def from_spectrum(
     spectra: NDArray[Any], shape: tuple[int, int], spans: tuple[int, int], workers: int = 1
 ) -> NDArray[Any]:
-    """Return the upper left parts, (…, ny, nx), of the images of a shape that have spectra.
+    """Return the upper left parts, (…, ny, nx), of the images of a shape, from their spectra.
 
-    They are real where spectra are half. Spectra may be overwritten.
+    Images of half spectra are real. Spectra may be overwritten.
     """
-    # Rows that are not asked for are not transformed.
+    # Rows that are not returned are not transformed.
     lines = scipy.fft.ifft(spectra, axis=-2, norm="forward", overwrite_x=True, workers=workers)[
         ..., : spans[0], :
     ]
@@ -117,7 +117,7 @@ def from_spectrum(
 def box_sums(images: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
     """Return the sums of images, (…, h, w), over all boxes of a size: (…, h - height + 1, …)."""
     rows, cols = images.shape[-2:]
-    # One image above the other: boxes inside one see nothing of the next.
+    # Images are stacked one above the other: boxes inside one do not reach the next.
     tall = images.reshape(-1, cols)
     sums = cv2.boxFilter(
         tall, cv2.CV_32F, (width, height), anchor=(0, 0), normalize=False, borderType=_ZERO
@@ -127,9 +127,9 @@ def box_sums(images: NDArray[np.float32], height: int, width: int) -> NDArray[np
 
 
 def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
-    """Return at all shifts which share of the template's valid pixels meets valid pixels.
+    """Return the share of the template's valid pixels that meets valid ones at each shift.
 
-    Of stacks of windows, (…, h, w), shares are of the shape (…, ny, nx).
+    Shape (…, ny, nx) for stacks of windows, (…, h, w).
     """
     count = np.maximum(template.valid.sum(axis=(-2, -1), keepdims=True, dtype=np.float32), 1)
     return _sums_where(template.valid, search.valid.astype(np.float32)) / count
@@ -156,9 +156,9 @@ def correlate_fields(
     ----------
     template, search
         Fields that are zero where they are not valid, shapes (n, …, h, w) and
-        (n, …, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of what overlaps.
+        (n, …, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of the overlap.
     template_valid, search_valid
-        What is valid, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
+        Validity of pixels, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
 
     Returns
     -------
@@ -181,7 +181,7 @@ def correlate_fields(
 def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     """Return the normalised cross-correlation of grey values over shifts ([Suri2010] eq 3.2).
 
-    With masks, each shift is normalised by the pixels that are valid in both [Padfield2012].
+    With masks, each shift is normalised over the pixels that are valid in both [Padfield2012].
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:
     t, s = _centred(template), _centred(search)
     whole = template.valid.all(axis=(-2, -1)) & search.valid.all(axis=(-2, -1))
     found = np.empty((*whole.shape, *spans(t, s)), np.float32)
-    # An image alone has the digits that it has in a stack.
+    # Each image is worked alone, so that its digits do not depend on the stack.
     if whole.any():
         found[whole] = each(_coefficients, t[whole], s[whole])
     if not whole.all():
@@ -211,8 +211,8 @@ def _coefficients(t: FloatImage, s: FloatImage) -> FloatImage:
 def _centred(patch: Patch) -> FloatImage:
     """Return images without the means of their valid pixels, 0 where they are not valid.
 
-    Single precision would lose small contrast on large values. So that it holds squares in any
-    unit, images are scaled to 1, by a power of two: no digit changes.
+    Single precision would lose small contrast on large values. Images are scaled to 1, so that it
+    holds their squares in any unit; the factor is a power of two, which changes no digit.
     """
     counts = patch.valid.astype(np.float32)
     sums = (patch.values * counts).sum(axis=(-2, -1), keepdims=True)
@@ -222,7 +222,7 @@ def _centred(patch: Patch) -> FloatImage:
     low, high = (of(centred, axis=(-2, -1), keepdims=True) for of in (np.min, np.max))
     _, exponents = np.frexp(np.maximum(-low, high))
     scale = np.ldexp(np.float32(1), np.minimum(-exponents, 127))
-    # What is left of a single grey value is rounding.
+    # A constant image leaves only rounding.
     centred *= np.where(low < high, scale, np.float32(0))
     return np.asarray(centred)
 
@@ -230,10 +230,10 @@ def _centred(patch: Patch) -> FloatImage:
 def _masked_coefficients(
     t: FloatImage, t_valid: NDArray[np.bool_], s: FloatImage, s_valid: NDArray[np.bool_]
 ) -> FloatImage:
-    """Return the correlation of images, 0 where they are not valid, by what is valid in both."""
+    """Return the correlation over pixels valid in both images, which are 0 where not valid."""
     found, is_exact = _coefficients_where_valid(t, t_valid, s, s_valid, np.float32)
     if not is_exact.all():
-        # Scatterers far above all else: double precision takes more than twice the time.
+        # Strong scatterers exceed single precision; double takes more than twice the time.
         rough = ~is_exact
         part = t[rough], t_valid[rough], s[rough], s_valid[rough]
         found[rough] = _coefficients_where_valid(*part, np.float64)[0]
@@ -247,11 +247,11 @@ def _coefficients_where_valid(
     s_valid: NDArray[np.bool_],
     precision: type[np.floating],
 ) -> tuple[FloatImage, NDArray[np.bool_]]:
-    """Return coefficients, (n, ny, nx), and of which images they are exact at all shifts, (n,).
+    """Return coefficients, (n, ny, nx), and for which images they are exact at all shifts, (n,).
 
-    They are 0 where a precision does not give the variances.
+    Coefficients are 0 where the precision does not resolve the variances.
     """
-    # Each of a window's three spectra serves several sums.
+    # Each of a window's three spectra is used in several sums.
     shape = fast_shape(s)
     of_t, of_s = (
         spectrum(
@@ -267,8 +267,9 @@ def _coefficients_where_valid(
     count, sum_t, sum_s = np.maximum(sums(0, 0), 1), sums(1, 0), sums(0, 1)
     covariance = sums(1, 1) - sum_t * sum_s / count
     variance_t, variance_s = sums(2, 0) - sum_t**2 / count, sums(0, 2) - sum_s**2 / count
-    # Sums by spectra are rounded by a digit of the product of norms. Of a mask, and of squares up
-    # to 1 at most, a norm is the root of their sum, the spectrum's at frequency 0.
+    # Sums from spectra are rounded by a last digit of the product of both norms. The norm of a
+    # mask is the root of its sum, the spectrum at frequency 0; for squares up to 1, that root is
+    # an upper limit.
     valid_t, _, squares_t = of_t[..., :1, :1].real
     valid_s, _, squares_s = of_s[..., :1, :1].real
     unit = np.finfo(precision).eps / _ROUNDING

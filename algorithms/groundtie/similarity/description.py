@@ -1,4 +1,4 @@
-"""What measures of similarity compare: bins, orientation fields and edge strength of windows."""
+"""Inputs of the similarity measures: bins, orientation fields and edge strength of windows."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from .binning import to_bins
 from .joint_histogram import reach
 from .orientation import SCALES_PX, edge_strength, orientation_fields
 
-# Pixels that windows have beyond the chip on each side: what the widest gradient filter and the
-# widest histogram kernel reach.
+# Pixels that windows have beyond the chip on each side: the reach of the widest gradient filter and
+# the widest histogram kernel.
 BORDER_PX = 8
 
 _MARGIN_PX = reach()
 
-# What all of a description takes: grey values and their validity, complex fields, strength and its
+# Memory of a whole description: grey values and their validity, complex fields, strength and its
 # validity, bins.
 BYTES_A_PIXEL = 5 + 8 * len(SCALES_PX) + 5 + 1
 
 
 @dataclass(frozen=True)
 class _Window:
-    """Image windows with `BORDER_PX` on each side; each description is made when first asked."""
+    """Image windows with `BORDER_PX` on each side; each description is made at its first use."""
 
     patch: Patch
     bin_count: int
@@ -47,14 +47,14 @@ class _Window:
 
 @dataclass(frozen=True)
 class Description:
-    """Image windows and what measures compare of them, shared by all of their inner parts.
+    """Image windows and their descriptions for measures, shared by all of their inner parts.
 
     Parameters
     ----------
     window
         The whole windows: one, or a stack of one size.
     border_px
-        Pixels of them that are left out on each side, at least `BORDER_PX`.
+        Pixels that are left out on each side, at least `BORDER_PX`.
     """
 
     window: _Window
@@ -86,7 +86,7 @@ class Description:
 
     @property
     def bins_around(self) -> NDArray[np.uint8]:
-        """Bins of the patch, and of pixels around it as far as the histogram's kernel reaches."""
+        """Bins of the patch and of its surroundings within reach of the histogram's kernel."""
         return self._bins(self.border_px - BORDER_PX)
 
     def _bins(self, border_px: int) -> NDArray[np.uint8]:
@@ -101,5 +101,5 @@ class Description:
 
     @property
     def strength(self) -> Patch:
-        """How strong edges are, 0 to 1."""
+        """Strength of edges, 0 to 1."""
         return self.window.strength.inner(self.border_px)

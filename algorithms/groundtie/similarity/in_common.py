@@ -1,6 +1,6 @@
-"""How much two arrays have the same, pixel by pixel, by counts over all windows, and what it shows.
+"""The pixel content that two arrays share, counted over all windows, and the rules that judge it.
 
-What is counted in a window is in `sameness`.
+`sameness` does the counting in one window.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..rasters.reading import Mask
 from .sameness import FARTHEST_PX, Edges, Windows, edges_apart_px
 from .seams import DRAWN_WIDTH, ONE_SIDED_5_PERCENT, step_width
 
-# None, and offsets (x, y) at which edges coincide by chance: so many, on a spiral.
+# Offset zero, and offsets (x, y) on a spiral at which edges coincide only by chance.
 _CHANCE_OFFSETS = 8
 _FIRST_TURN_PX, _GOLDEN_ANGLE = 7.0, np.pi * (3 - np.sqrt(5))
 _STEPS = np.arange(_CHANCE_OFFSETS)
@@ -26,87 +26,90 @@ _SPIRAL = (_FIRST_TURN_PX + 2 * _STEPS) * np.stack(
 _OFFSETS = np.vstack([[0, 0], np.rint(_SPIRAL.T)]).astype(int)
 LOOK_REACH_PX = int(np.abs(_OFFSETS).max())
 
-# What is drawn has its edges at one fraction of a pixel, in whatever colours: beyond chance, within
-# the first of the other's are so many times as many as from there to the second. Edges of one
-# ground are blurred by noise, light and physics. Suite sharpness: of different sensors and dates up
-# to 2.5 (one of 340 pairs, a simulated town, 4.6), of different bands on one grid up to 2.45 (years
-# apart) and, of one exposure, 4.2 in 28 of 36 pairs (so that the second is the limit of one
-# camera's views; the others from 6.8 on). Where right transforms have it (suite attacks, controls):
-# up to 2.8; where ground is displaced beneath snow of one shape, from 2.93 on.
+# Edges of drawn content coincide at the same fraction of a pixel, in whatever colours; edges of the
+# ground are blurred by noise, light and physics. Sharpness is the number of edges within _SHARP_PX
+# of an edge of the other array over the number from there to _BLURRED_PX, both beyond chance.
+# Suite sharpness: up to 2.5 between different sensors and dates (4.6 in one of 340 pairs, a
+# simulated town); up to 2.45 between different bands on one grid, years apart; up to 4.2 between
+# bands of one exposure in 28 of 36 pairs, from 6.8 on in the others. VIEW_SHARPNESS is therefore
+# the limit for views of one camera. Suite attacks: up to 2.8 in controls with right transforms;
+# from 2.93 on where ground is displaced beneath snow of one shape.
 _SHARP_PX, _BLURRED_PX = 0.25, 0.5
 LEAST_SHARPNESS, VIEW_SHARPNESS = 2.9, 5.0
 
-# Edges of one ground lie on one another, and where a transform is wrong beside one another, to
-# either side of their gradients, as these point to all sides. Those of one thing that is drawn
-# twice, in other widths or as thinner cloud, lie to one side: so many more than to the other, in
-# steps as wide, as lie on one another.
+# Edges of one ground coincide. If the transform is wrong, they lie on either side of one another,
+# because gradients point in all directions. If one object is drawn twice, with another width or
+# as thinner cloud, its edges lie on one side. The limit applies to the excess of one side over the
+# other in an interval, relative to the coinciding edges in an interval of the same width.
 _BESIDE_PX = 1.0, 1.5, float(FARTHEST_PX)
 MOST_BESIDE = 1.0
 
 _NEAR_PX = np.array([0.0, _SHARP_PX, _BLURRED_PX, *_BESIDE_PX])
 
-# More of the area than this varies alike where holes or waters of one shape are cut into noise, or
-# clouds of one deck lie over both. Different sensors' views of one ground, and those of day and
-# night: up to 25 %, measured on the shared pairs where right transforms have them (suite real).
+# A larger share of the area than this varies alike if holes or waters of one shape are cut into
+# noise, or one cloud deck covers both images. Views of one ground by different sensors, or by day
+# and night, reach up to 25 % (suite real, the shared pairs with their right transforms).
 LEAST_AREA = 0.3
 
-# Less than this is what most right pairs of a radar's and a camera's image have the same (15 of 17
-# in suite sharpness): without it they show hardly less, and need not be matched once more.
+# Most right pairs of a radar and a camera image share less than this (15 of 17 in suite sharpness).
+# Masking so little changes hardly anything, so such pairs need not be matched again.
 _LEAST_PART = 0.05
 
-# One sensor's views of one ground vary alike where nothing is drawn, too, on images that are so
-# much smaller, and no less on images reduced once more. Measured as above: 25 % of what is left and
-# more; of different ground 0 to 21 %, of ground that was displaced up to 43 %, which is left to the
-# rules on a second place. Less than a tenth of the area shows nothing. As much may follow in other
-# colours: 24 % of a noisy negative (tests/test_steps.py), up to 1 % of what is drawn over two
-# radars' images of different ground. The further step is an octave: by it, 1.04 times as much and
-# more varies alike in right radar pairs, less in noise that is smooth along some pixels (suite
-# attacks).
+# Views of one ground by one sensor also vary alike outside drawn content, in images reduced by
+# _REDUCTION and no less in images reduced once more by _FURTHER. Measured as above, on the
+# remaining area: 25 % and more; 0 to 21 % on different ground; up to 43 % on displaced ground,
+# which is left to the rules on a second place. Less than a tenth of the area is no evidence.
+# The same share may be related in other colours: 24 % of a noisy negative (tests/test_steps.py),
+# up to 1 % of content drawn over two radar images of different ground. The further reduction is one
+# octave. After it, the share is at least 1.04 times as large in right radar pairs, and smaller in
+# noise that is smooth along some pixels (suite attacks).
 #
-# Light and seasons differ over wide areas: two dates of one camera are alike in coarse pixels by
-# 0.96 times as much as in finer ones, or more (suite sharpness); patterns of noise that are smooth
-# along up to 2 pixels by 0.78 times as much, or less (tests/matching/test_locked.py). Smoother ones
-# are as ground is, and pass (suite attacks, soft pattern noise).
+# Light and seasons differ over wide areas. Two dates of one camera share at least 0.96 times as
+# much in coarse pixels as in finer ones (suite sharpness); noise patterns that are smooth along up
+# to 2 pixels share at most 0.78 times as much (tests/matching/test_locked.py). Smoother patterns
+# cannot be told from ground, and pass (suite attacks, soft pattern noise).
 _REDUCTION, _FURTHER = 4, 2
 _GROUND_SHARE, _LEAST_COARSE_SHARE = 0.23, 0.9
 _LEAST_LEFT = 0.1
 
-# Where a transform has what is the same lie as nothing drawn does, less shows one ground. Of 12
-# right transforms 10 have more, the one wrong one has 13 % (suite margins, --seeds 87000-87029
-# --sample 120). Clouds, snow and waters that are put so into both images have as much as ground.
+# A smaller share is evidence of one ground if the transform moves the common content as no drawn
+# content is moved. 10 of 12 right transforms exceed this limit; the one wrong transform has 13 %
+# (suite margins, --seeds 87000-87029 --sample 120). Clouds, snow and waters that are inserted into
+# both images with such a transform reach as much as ground.
 MOVED_GROUND_SHARE = 0.15
 
-# Pixels of reduced images are means of at least this share of theirs.
+# Least valid share of the pixels that a pixel of a reduced image averages.
 _LEAST_VALID = 0.25
 
-# Nothing is left to be judged of copies: this share is the same, in the images and reduced ones.
+# Copies share this much, in the images and in reduced ones, so that too little is left to judge.
 _COPY_SHARE = 0.75
 
 
 @dataclass(frozen=True)
 class Sameness:
-    """How much two arrays have the same where one is laid on the other.
+    """How much pixel content two superimposed arrays share.
 
     Parameters
     ----------
     sharpness
-        How many times as many edges coincide there within a quarter of a pixel as between a
-        quarter and a half, each beyond those at other offsets; at least, as far as the latter are
-        known, but by chance with 5 %.
+        Number of edges that coincide within a quarter of a pixel over the number between a quarter
+        and a half, each less its mean at other offsets. A lower limit: the divisor is its upper
+        limit, exceeded by chance with 5 %.
     area, reduced_area, coarse_area
         Share of the area that varies alike, in the images, in reduced ones, and in those reduced
         once more.
     ground
-        That in reduced ones, of what does not vary alike in the images.
+        Share that varies alike in reduced images, of the area that does not in the images.
     related
-        Share of the area where one is half a linear function of the other, in the images or in
-        reduced ones, whichever is smaller.
+        Share of the area where a linear function of one array explains half of the other, in the
+        images or in reduced ones, whichever is smaller.
     step_width
         See `seams.step_width`.
     beside
-        How many more edges lie a half to 1, 1 to 1.5, or 1.5 to 2 pixels to one side of the
-        other's than to its other one, for each within a half; or a quarter to a half, for each
-        within a quarter; whichever is most; at least, as above.
+        Excess of edges on one side of the other array's edges over those on its other side: a half
+        to 1, 1 to 1.5, or 1.5 to 2 pixels away, relative to the edges within a half; or a quarter
+        to a half away, relative to those within a quarter; the largest of these. A lower limit, as
+        above.
     """
 
     sharpness: float
@@ -120,17 +123,17 @@ class Sameness:
 
     @property
     def is_evident(self) -> bool:
-        """Whether more is the same than two sensors' views show of one ground."""
+        """Whether the arrays share more than two sensors' views of one ground do."""
         return self.is_marked or self.area >= LEAST_AREA
 
     @property
     def is_marked(self) -> bool:
-        """Whether edges or seams are not those of ground."""
+        """Whether the common edges or seams are not those of ground."""
         return self.has_sharp_edges or self.has_edges_beside or self.has_seams
 
     @property
     def covers_most(self) -> bool:
-        """Whether so much varies alike that hardly anything is left."""
+        """Whether so much varies alike that hardly any other area is left."""
         return self.area >= _COPY_SHARE
 
     @property
@@ -142,14 +145,14 @@ class Sameness:
     def has_sharp_edges(self) -> bool:
         """Whether edges coincide more sharply than those of one ground.
 
-        Of copies, in whatever colours: than those of one exposure's bands.
+        For copies, in whatever colours, the limit is that of bands of one exposure.
         """
         is_copy = self.is_copy or self.is_copy_in_other_colours
         return self.sharpness >= (VIEW_SHARPNESS if is_copy else LEAST_SHARPNESS)
 
     @property
     def has_edges_beside(self) -> bool:
-        """Whether edges lie beside one another rather than on one another, as of no ground."""
+        """Whether more edges lie beside one another than coincide, as on no ground."""
         return self.beside > MOST_BESIDE
 
     @property
@@ -159,54 +162,54 @@ class Sameness:
 
     @property
     def is_finer_than_ground(self) -> bool:
-        """Whether less is the same in coarser pixels.
+        """Whether the arrays share less in coarser pixels.
 
-        Ground is no less alike there, where noise has averaged out; noise that both have is.
+        Averaging removes noise: it leaves ground no less alike, but common noise less.
         """
         return self.coarse_area < self.reduced_area
 
     @property
     def is_copy_in_other_colours(self) -> bool:
-        """Whether one image follows from the other nearly everywhere, as from its negative."""
+        """Whether one image is a function of the other nearly everywhere, such as its negative."""
         return self.related >= _COPY_SHARE
 
     @property
     def is_copy(self) -> bool:
-        """Whether one image is a copy of the other: nearly everything is the same."""
+        """Whether one image is a copy of the other nearly everywhere."""
         return min(self.area, self.reduced_area, self.coarse_area) >= _COPY_SHARE
 
     @property
     def is_view(self) -> bool:
         """Whether both may be one camera's views of one ground.
 
-        Edges coincide no more sharply than those of its bands, and little less is alike in coarser
-        pixels, by light and season.
+        Their edges coincide no more sharply than those of its bands. Light and season may leave
+        them a little less alike in coarser pixels.
         """
         is_ground = self.coarse_area >= _LEAST_COARSE_SHARE * self.reduced_area
         return self.ground >= _GROUND_SHARE and is_ground and self.sharpness < VIEW_SHARPNESS
 
     @property
     def is_of_one_sensor(self) -> bool:
-        """Whether coarse pixels vary alike over as much as finer ones do of nothing but one ground.
+        """Whether coarse pixels vary alike over more area than those of different sensors.
 
-        Those of a despeckled radar's and a camera's image up to 29 % (suite sharpness), of two
-        cameras' from 33 % on where a radar's town is looked for (suite one_grid).
+        Up to 29 % for a despeckled radar image and a camera image (suite sharpness); from 33 % on
+        for two camera images in which a radar's town is searched for (suite one_grid).
         """
         return self.coarse_area >= LEAST_AREA and not self.is_finer_than_ground
 
     @property
     def leaves_ground(self) -> bool:
-        """Whether what is not the same varies alike, too, if only a little."""
+        """Whether a little of the remaining area varies alike, too, in reduced images."""
         return self.ground >= MOVED_GROUND_SHARE
 
     @property
     def varies_as_ground(self) -> bool:
-        """Whether as much as of one ground varies alike, or follows in other colours."""
+        """Whether as much varies alike, or is related in other colours, as on one ground."""
         return self.has_one_ground or self.related >= _GROUND_SHARE
 
     @property
     def has_one_ground(self) -> bool:
-        """Whether what is not the same varies alike, too, as one sensor's views of one ground."""
+        """Whether the remaining area varies alike, too, as in one sensor's views of one ground."""
         return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
@@ -216,17 +219,17 @@ _NO_EDGES = np.zeros((len(_OFFSETS), 2, len(_NEAR_PX) - 1), int)
 
 @dataclass(frozen=True)
 class Look:
-    """What one window shows.
+    """Counts of one window.
 
     Parameters
     ----------
     edges
-        How many lie between each two of `_NEAR_PX` of one another, at each of `_OFFSETS`, on the
-        darker and the brighter side, shape (k, 2, 5).
+        Number of edges in each distance interval of `_NEAR_PX` from one another, at each of
+        `_OFFSETS`, on the darker and the brighter side, shape (k, 2, 5).
     windows
-        How many pixels are the same, related, and valid (see `Windows`): of the images, of reduced
-        ones, of those reduced once more, and of reduced ones without what is the same in the
-        images, shape (4, 3).
+        Number of pixels that are the same, related, and valid (see `Windows`): in the images, in
+        reduced ones, in those reduced once more, and in reduced ones without the pixels that are
+        the same in the images, shape (4, 3).
     """
 
     edges: NDArray[np.int_]
@@ -234,7 +237,7 @@ class Look:
 
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> Look:
-        """Return what two patches show."""
+        """Return the counts of two patches."""
         whole = Windows.of(reference, input)
         both = reference, input
         without_same = [replace(patch, valid=patch.valid & ~whole.same) for patch in both]
@@ -249,14 +252,14 @@ class Look:
 
 
 def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> Sameness:
-    """Return how much arrays have the same in windows all over them.
+    """Return how much arrays share, from windows all over them.
 
     Parameters
     ----------
     looks
-        What windows show.
+        Counts of the windows.
     steps
-        Their `step_products`, of the input where it is not resampled if it can be.
+        Their `step_products`, from the input without resampling where possible.
     """
     edges = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
     sharp, blurred, *_ = edges.sum(axis=1).T
@@ -282,20 +285,20 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
 
 
 def _most_of(some: NDArray[np.int_]) -> float:
-    """Return how many edges coincide beyond chance, at most, by counts at each of `_OFFSETS`."""
+    """Return an upper limit of the edges that coincide beyond chance, by counts at `_OFFSETS`."""
     chance = some[1:].mean()
-    # Of counts, which vary as much as they are many.
+    # The variance of a count is its mean.
     error = np.sqrt(some[0] + chance / _CHANCE_OFFSETS + 1)
     return float(max(some[0] - chance, 0.0) + ONE_SIDED_5_PERCENT * error)
 
 
 def _more_of(sides: NDArray[np.int_]) -> float:
-    """Return how many more edges lie to one side than to the other, at least, by their counts."""
+    """Return a lower limit of the excess of edges on one side over the other, by their counts."""
     return float(abs(sides[1] - sides[0]) - ONE_SIDED_5_PERCENT * np.sqrt(sides.sum()))
 
 
 def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
-    """Return `Look.edges` of two patches: how many strong edges lie how near to one another."""
+    """Return `Look.edges` of two patches: numbers of strong edges by distance."""
     one, other = (Edges.of(patch).strongest for patch in (reference, input))
     apart = edges_apart_px(one.inner(LOOK_REACH_PX), other, _OFFSETS)[:, None]
     sides = np.concatenate([-apart, apart], axis=1)[..., None]
@@ -303,7 +306,7 @@ def _count_edges(reference: Patch, input: Patch) -> NDArray[np.int_]:
 
 
 def drawn_edges(reference: Patch, input: Patch) -> Mask:
-    """Return where edges coincide of which one at least is strong, shape (h, w)."""
+    """Return the pixels where edges coincide, at least one of them strong, shape (h, w)."""
     one, other = Edges.of(reference), Edges.of(input)
     drawn = np.zeros_like(one.found)
     for edges, others in ((one, other.strongest), (one.strongest, other)):

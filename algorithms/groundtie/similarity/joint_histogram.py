@@ -6,8 +6,8 @@ integer shifts, as long as every shift sees the same template pixels:
 
     h(i + u, j + v) = Σ_p Σ_q β(p - u) β(q - v) h_NN(i + p, j + q)
 
-So pixels are counted once, at integer shifts; every order follows from the counts without
-touching a pixel again.
+Pixels are therefore counted once, at integer shifts; the histograms of every order follow from
+these counts.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ FloatArray = NDArray[np.float32]
 # The cubic B-spline is the first without interpolation artefacts.
 ORDER = 4
 
-# Seconds to count a pixel at a shift; to call OpenCV; for each element and halving of an FFT:
-# `benchmarks/run.py --only kernels`.
+# Seconds to count a pixel at a shift, to call OpenCV, and for each element and halving of an FFT
+# (`benchmarks/run.py --only kernels`).
 _PIXEL_COST, _CALL_COST, _SPECTRAL_COST = 0.8e-9, 3.5e-6, 0.15e-9
 
-# Rounding of a correlation by FFT stays below four times the product of both arrays' norms and of
-# half a unit in the last place. Whole numbers are told apart up to a half.
+# Rounding of a correlation by FFT stays below four times the product of both arrays' norms and
+# half a unit in the last place. Whole numbers need an error below one half.
 _LARGEST_ROUNDING = 0.5 / 4
 
 
 def reach(order: int = ORDER) -> int:
-    """Return how far the kernel of this order reaches at integer shifts, in whole pixels."""
+    """Return the reach of the kernel of this order at integer shifts, in whole pixels."""
     return (order - 1) // 2
 
 
 def gpve_histograms(counts: FloatArray, order: int = ORDER) -> FloatArray:
-    """Return the GPVE histograms at all integer shifts around which the kernel's reach was counted.
+    """Return the GPVE histograms at all integer shifts at which the kernel lies inside the counts.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def gpve_histograms(counts: FloatArray, order: int = ORDER) -> FloatArray:
     planes = np.moveaxis(counts, (-2, -1), (-4, -3))
     span_y, span_x = (n - 2 * far for n in planes.shape[-2:])
     made = np.empty((*planes.shape[:-2], span_y, span_x), np.float32)
-    # Bin by bin, so that what is worked stays in the processor's cache.
+    # Bin by bin, so that the working set stays in the processor's cache.
     for own in range(planes.shape[-4]):
         rows = _convolve(planes[..., own, :, :, :], weights, span_y, -2)
         made[..., own, :, :, :] = _convolve(rows, weights, span_x, -1)
@@ -96,7 +96,7 @@ def count_joint_histograms(
     bins
         Number of bins of template and search window.
     context
-        Threads to count in; by default the calling one alone.
+        Threads to count in; by default the calling thread alone.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def _count_directly(
     bins: tuple[int, int],
     context: Context | None,
 ) -> FloatArray:
-    """Count one shift after the other."""
+    """Count shift by shift."""
     height, width = template.shape[-2:]
     rows, cols = spans(template, search)
     sizes = [n + 1 for n in bins]
@@ -153,15 +153,15 @@ def _count_spectrally(
 ) -> FloatArray:
     """Count all shifts at once by correlating the planes of all bins with each other.
 
-    Counts are whole numbers: several bins of the search window, times powers of 2, share a plane,
-    and their counts are the digits of what is found.
+    Counts are whole numbers. Several bins of the search window, weighted by powers of 2, therefore
+    share a plane, and their counts are the digits of the correlation.
     """
     shape = tight_shape(template, search < bins[1])
     digits = _Digits.of(template, search, bins)
     other = np.moveaxis(np.take(digits.weights(bins[1]), search, axis=1), 0, -3)
     of_search = spectrum(other, shape, workers)
     counts = np.empty((*template.shape[:-2], *bins, *spans(template, search)), np.float32)
-    # Bin by bin, so that what is worked stays in the processor's cache, and always in one place.
+    # Bin by bin and in one buffer, so that the working set stays in the processor's cache.
     product = np.empty_like(of_search)
     for bin in range(bins[0]):
         of_template = spectrum((template == bin).astype(digits.dtype), shape, workers).conj()
@@ -173,16 +173,16 @@ def _count_spectrally(
 
 @dataclass(frozen=True)
 class _Digits:
-    """How counts of several bins are held by one floating-point number.
+    """Layout of the counts of several bins in one floating-point number.
 
     Parameters
     ----------
     dtype
         Type of the number.
     bits
-        Of each count.
+        Bits of each count.
     count
-        How many counts a number holds.
+        Number of counts in a number.
     """
 
     dtype: type[np.floating]
@@ -206,20 +206,20 @@ class _Digits:
             return min(1 + math.floor(spare / bits), bins[1])
 
         single, double = most(np.float32), most(np.float64)
-        # Double precision takes twice the time, and more digits a little more.
+        # Double precision takes twice the time; reading more digits takes a little more.
         if double <= 2.5 * single:
             return cls(np.float32, bits, single)
         return cls(np.float64, bits, max(double, 1))
 
     def weights(self, bins: int) -> NDArray[np.floating]:
-        """Return what a pixel of each bin, and a masked one, adds to planes, (planes, bins + 1)."""
+        """Return the weights of each bin, and of masked pixels, in planes, (planes, bins + 1)."""
         bin = np.arange(bins)
         weights = np.zeros((-(-bins // self.count), bins + 1), self.dtype)
         weights[bin // self.count, bin] = 2.0 ** (self.bits * (bin % self.count))
         return weights
 
     def read(self, planes: NDArray[np.floating], counts: FloatArray) -> None:
-        """Write what planes, (…, planes, ny, nx), hold as counts, shape (…, bins, ny, nx)."""
+        """Write the counts in planes, (…, planes, ny, nx), to `counts`, (…, bins, ny, nx)."""
         whole = np.rint(planes).astype(np.int32 if self.dtype is np.float32 else np.int64)
         for digit in range(self.count):
             part = counts[..., digit :: self.count, :, :]

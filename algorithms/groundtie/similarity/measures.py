@@ -1,9 +1,9 @@
 """Measures of similarity: functions of two windows that return surfaces over shifts.
 
 To add a measure, write its function in this file below `@measure("its-name")`, and its test. Every
-tool that lets one choose a similarity then offers it, and `similarity_surface` shows it. A measure
-of joint histograms is one line: `measure("name")(of_histograms(function))`. Measures that are only
-compared with these are in `studies.measures`.
+tool with a choice of similarity then offers it, and `similarity_surface` shows it. A measure of
+joint histograms is one line: `measure("name")(of_histograms(function))`. Measures that only serve
+for comparison are in `studies.measures`.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ FloatArray = NDArray[np.floating]
 Histograms: TypeAlias = Any  # an array, or a sparse matrix of scipy
 
 # Takes joint histograms of counts or weights, shape (…, bins A, bins B), or one histogram as a
-# sparse matrix, and returns values of shape (…). Where there is nothing to share, without any
-# pixel or with a constant image, it has the value of independent images.
+# sparse matrix, and returns values of shape (…). Without any pixel, or with a constant image, the
+# value is that of independent images.
 HistogramMeasure = Callable[[Histograms], FloatArray]
 
 # Takes templates (…, h, w), one or a stack; search windows with the same centres that are larger
 # by a radius on each side; and a context to work in. Returns values over shifts, shape
-# (…, 2 radius + 1, 2 radius + 1), or several such surfaces that count the same, shape (n, …).
+# (…, 2 radius + 1, 2 radius + 1), or several such surfaces of equal weight, shape (n, …).
 Measure = Callable[[Description, Description, Context | None], FloatArray]
 
 MEASURES: dict[str, Measure] = {}
 
-# How numpy sums along contiguous memory: in so many lanes, blocks of so many.
+# Lanes and block length with which numpy sums along contiguous memory.
 _LANES, _PAIRWISE_BLOCK = 8, 128
 
 # Entropies below this hold rounding only.
@@ -53,7 +53,7 @@ def measure(name: str) -> Callable[[Measure], Measure]:
 
 
 def of_histograms(function: HistogramMeasure) -> Measure:
-    """Return the measure of windows that a measure on joint histograms makes."""
+    """Return the measure of windows that applies a measure of joint histograms."""
 
     def values(template: Description, search: Description, context: Context | None) -> FloatArray:
         bins = (template.bin_count, search.bin_count)
@@ -116,10 +116,10 @@ def entropy(table: FloatArray) -> FloatArray:
 
 
 def pairwise_sum(table: FloatArray) -> FloatArray:
-    """Return sums along the last axis, with the digits that numpy's have in contiguous memory.
+    """Return sums along the last axis, with the digits of numpy's sums in contiguous memory.
 
-    Histograms of many shifts lie with shifts last, which are quick to add but lose digits: numpy
-    adds pairwise along contiguous memory only.
+    Histograms of many shifts have the shifts last in memory. Adding them is quick but loses digits,
+    because numpy adds pairwise along contiguous memory only.
     """
     if table.strides[-1] == table.itemsize:
         return np.asarray(table.sum(axis=-1))

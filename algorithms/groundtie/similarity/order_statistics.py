@@ -1,6 +1,6 @@
-"""Medians, robust deviations and quantiles, by the quick ways numpy has to order single values.
+"""Medians, robust standard deviations and quantiles, by numpy's quick partial sorting.
 
-They have the digits of `numpy.median` and `numpy.quantile`, which take several times as long.
+Results equal those of `numpy.median` and `numpy.quantile`, which take several times as long.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# NumPy sorts and selects by vector instructions since version 2. Before, it is quicker to select
-# among the values of a bucket alone, of so many, from so many values on.
+# NumPy sorts and selects by vector instructions since version 2. Before, selecting within one of
+# _BUCKETS buckets is quicker from _MANY values on.
 _MANY = np.inf if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 4096
 _BUCKETS = 1024
 
-# The standard deviation over the median absolute deviation, of a normal distribution: 1 / Φ⁻¹(3/4).
+# Standard deviation of a normal distribution over its median absolute deviation: 1 / Φ⁻¹(3/4).
 DEVIATION_PER_MAD = 1.4826
 
 
 def upper_median(values: NDArray[Any]) -> Any:
-    """Return medians along the last axis; of an even number the upper of the middle two."""
+    """Return medians along the last axis; the upper of the middle two of an even number."""
     count = values.shape[-1]
     if count < _MANY:
         return np.partition(values, count // 2, axis=-1)[..., count // 2]
@@ -30,7 +30,7 @@ def upper_median(values: NDArray[Any]) -> Any:
 
 
 def median(values: NDArray[Any]) -> Any:
-    """Return the median of values of any shape; of an even number the mean of the middle two."""
+    """Return the median of values of any shape; the mean of the middle two of an even number."""
     middle = values.size // 2
     return np.mean(
         _ordered(values.ravel(), middle - 1 + values.size % 2, middle), dtype=values.dtype
@@ -38,25 +38,25 @@ def median(values: NDArray[Any]) -> Any:
 
 
 def robust_deviation(values: NDArray[Any]) -> float:
-    """Return the standard deviation that values of any shape would have if they were normal."""
+    """Return the robust standard deviation of values of any shape (by MAD)."""
     return DEVIATION_PER_MAD * float(median(np.abs(values - median(values))))
 
 
 def quantiles(values: NDArray[Any], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the values, (n,), below which shares of values lie, interpolated linearly, (n,)."""
+    """Return the quantiles of values, of any shape, at shares, (n,), interpolated linearly."""
     place = shares * (values.size - 1)
     below = np.floor(place).astype(int)
     above = np.minimum(below + 1, values.size - 1)
     # Not np.partition, which selects several places one by one.
     ordered = np.sort(values, axis=None)
     low, high, fraction = ordered[below], ordered[above], place - below
-    # From the nearer of the two, as numpy has it.
+    # Interpolated from the nearer of the two, as numpy does.
     step = high - low
     return np.where(fraction < 0.5, low + step * fraction, high - step * (1 - fraction))
 
 
 def _ordered(values: NDArray[Any], first: int, last: int) -> NDArray[Any]:
-    """Return the values at places `first` to `last`, one or two, when all, (n,), are in order."""
+    """Return the values at ranks `first` to `last`, one or two, of values of shape (n,)."""
     if values.size < _MANY:
         return _selected(values, first, last)
     low, high = values.min(), values.max()

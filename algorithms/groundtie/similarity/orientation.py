@@ -1,8 +1,8 @@
 """The squared orientation field: structure that survives a change of modality.
 
-Edges keep their place and direction between a SAR and an optical image when their contrast does
-not keep its sign. Squaring the complex gradient makes opposite directions the same; dividing by
-its magnitude makes weak and strong edges alike (orientation correlation [Fitch2002];
+Between a SAR and an optical image, edges keep their place and direction even where their contrast
+changes its sign. Squaring the complex gradient makes opposite directions equal; dividing by its
+magnitude gives weak and strong edges the same weight (orientation correlation [Fitch2002];
 normalised gradient fields [Haber2006]). The strength of edges is a measure of its own: see
 `edge_strength`.
 """
@@ -25,22 +25,22 @@ FloatArray = NDArray[np.floating]
 # Standard deviations of the Gaussian derivatives, in pixels; their surfaces are added up.
 SCALES_PX = (0.8, 1.2, 2.0)
 
-# A masked pixel spoils the gradient within this many standard deviations.
+# A masked pixel corrupts the gradient within this many standard deviations.
 _REACH = 3.0
 
-# Share of the median that is added before the logarithm, so that dark noise is not blown up.
+# Share of the median that is added before the logarithm, so that dark noise is not amplified.
 _LOG_OFFSET = 0.1
 
-# Gradients below this share of the largest value are rounding: where nothing varies, they would
-# all point the same way.
+# Gradients below this share of the largest value are rounding: in constant areas they would all
+# point in one direction.
 ROUNDING = 1e-5
 
 
 def compress(window: Patch) -> NDArray[np.float32]:
     """Return grey values on a logarithmic scale, on which speckle is additive, shape (…, h, w).
 
-    Images with negative values are taken to be on such a scale already (decibels); a few may
-    come from resampling. Masked pixels get the median.
+    Images with negative values are assumed to be on such a scale already (decibels), except for a
+    few, which may come from resampling. Masked pixels get the median.
     """
     return each(_compressed, window.values, window.valid)
 
@@ -72,7 +72,7 @@ def squared_gradients(
     Parameters
     ----------
     compressed, valid
-        Grey values (see `compress`) and which of them count, shape (…, h, w).
+        Grey values (see `compress`) and their validity, shape (…, h, w).
     scales_px
         Standard deviations of the Gaussian derivatives.
 
@@ -84,7 +84,7 @@ def squared_gradients(
     largest = np.abs(compressed).max(axis=(-2, -1), keepdims=True, initial=0)
     rounding = np.float32(ROUNDING) * largest
     whole = valid.all()
-    # Everything in place, as most of the time is that of memory.
+    # All in place: memory access takes most of the time.
     gx, gy, product, size = np.empty((4, *compressed.shape), np.float32)
     for field, scale in zip(fields, scales_px, strict=True):
         _differentiate(compressed, scale, gx, gy)
@@ -107,14 +107,14 @@ def squared_gradients(
 
 
 def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Patch:
-    """Return how strong edges are, whatever their direction: 0 (none) to 1.
+    """Return the strength of edges, whatever their direction: 0 (none) to 1.
 
     Parameters
     ----------
     finest
         The squared gradients at the first of `SCALES_PX`, shape (…, h, w).
     valid
-        Which pixels of the image count, shape (…, h, w). Strength counts a few pixels less.
+        Validity of the image's pixels, shape (…, h, w). Strength is valid in a few pixels less.
     """
     # Not np.abs, whose last digits may depend on where arrays lie in memory.
     strength = np.sqrt(finest.real**2 + finest.imag**2)
@@ -141,7 +141,7 @@ def _kernels(scale_px: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _typical(sizes: FloatArray, usable: NDArray[np.bool_]) -> FloatArray:
-    """Return the median of usable sizes of each image, 1 where there are none, (…, 1, 1)."""
+    """Return the median of each image's usable sizes, 1 if it has none, (…, 1, 1)."""
     if usable.all():
         return upper_median(flat(sizes))[..., None, None]
 

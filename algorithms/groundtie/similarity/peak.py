@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .surface import Surface
 
-# Fitting a paraboloid to the nine values around a peak: the least-squares solution for the
-# coefficients of 1, x, y, x², xy, y², in rows.
+# Least-squares fit of a paraboloid to the nine values around a peak: its rows give the coefficients
+# of 1, x, y, x², xy, y².
 _Y, _X = (axis.ravel().astype(float) for axis in np.mgrid[-1:2, -1:2])
 _PARABOLOID = np.linalg.pinv(np.column_stack([np.ones(9), _X, _Y, _X**2, _X * _Y, _Y**2]))
 
@@ -28,7 +28,7 @@ class Peak:
     covariance_px2
         Covariance of the shift, shape (2, 2), x before y.
     at_border
-        Whether the peak lies at the border of the search window, so that it may be no peak.
+        Whether the highest value lies at the border of the search window, and may be no peak.
     """
 
     shift_px: tuple[float, float]
@@ -58,7 +58,7 @@ def find_peak(surface: Surface) -> Peak:
     determinant = xx * yy - axy * axy
     if determinant <= 0 or axx >= 0:
         return Peak(whole, height, wide, False)
-    # The inverse of the Hessian, by hand: for a single one, numpy takes many times as long.
+    # The Hessian is inverted by hand: for a single matrix, numpy takes many times as long.
     dx = min(max((axy * by - yy * bx) / determinant, -1.0), 1.0)
     dy = min(max((axy * bx - xx * by) / determinant, -1.0), 1.0)
     covariance = np.array([[-yy, axy], [axy, -xx]]) / (determinant * height)
@@ -80,8 +80,8 @@ def find_peak_near(surface: Surface, expected_px: ArrayLike, within_px: int) -> 
     expected_px
         The shift (x, y).
     within_px
-        How far the peak may lie from it along each axis; it counts as `at_border` if it does not
-        lie inside, or if this area reaches beyond the surface.
+        Largest distance of the peak from the expected shift along each axis. The peak counts as
+        `at_border` if it does not lie inside, or if this area reaches beyond the surface.
     """
     radius = surface.shape[0] // 2
     col, row = (round(float(e)) for e in np.asarray(expected_px))

@@ -21,11 +21,11 @@ def suppress(
     surface
         Any shape; heights above a background of 0.
     at
-        Index along each axis, near which nothing is a peak of its own.
+        Index of the place along each axis.
     footprint
-        What "near" is, centred at the place: as many axes as the surface, sides odd.
+        Pixels to set, centred at the place: as many axes as the surface, sides odd.
     circular
-        Axes whose ends are neighbours, as those of angles are.
+        Axes whose ends are neighbours, such as angles.
     """
     near = np.argwhere(footprint) - np.array(footprint.shape) // 2 + np.array(at)
     for axis in circular:
@@ -42,8 +42,9 @@ def highest_peaks(
 ) -> Iterator[tuple[int, ...]]:
     """Yield the indices of the highest values, best first, none in a higher one's footprint.
 
-    The surface is overwritten: a peak's footprint is suppressed when the next one is asked for.
-    Parameters as of `suppress`. There are always `count`; those that are not positive are none.
+    The surface is overwritten: a peak's footprint is suppressed before the next one is searched
+    for. Parameters are those of `suppress`. The iterator always yields `count` indices; values
+    that are not positive are no peaks.
     """
     for left in range(count, 0, -1):
         at = tuple(int(i) for i in np.unravel_index(surface.argmax(), surface.shape))

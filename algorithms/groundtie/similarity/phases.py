@@ -1,4 +1,4 @@
-"""Phase correlation: what shift the spectra of windows agree on, whatever their contrast.
+"""Phase correlation: the shift between windows by the phases of their spectra, at any contrast.
 
 Source: [Kuglin1975].
 """
@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from ..rasters.patch import Patch
 from .surface import Surface
 
-# Phases are the same to so many pixels, by interpolation: without these frequencies, a shift by
-# half a pixel has one peak, too.
+# Because of interpolation, phases agree only down to detail of this size. Without the higher
+# frequencies, a shift by half a pixel has a single peak, too.
 _BLUR_PX = 0.7
 
 Spectra = NDArray[np.complex64]
 
 
 def spectra(windows: Patch) -> Spectra:
-    """Return the spectra of square windows, shape (n, s, s), tapered: (n, s, s // 2 + 1)."""
+    """Return the spectra, (n, s, s // 2 + 1), of tapered square windows, (n, s, s)."""
     valid = windows.valid
     values = np.where(valid, windows.values, 0)
     known = np.maximum(valid.sum(axis=(1, 2), keepdims=True), 1)
@@ -30,19 +30,19 @@ def spectra(windows: Patch) -> Spectra:
 
 
 def phases(one: Spectra, other: Spectra) -> Spectra:
-    """Return the phases by which spectra of one shape differ; 0 where either has none."""
+    """Return the phase differences of spectra of one shape; 0 where either spectrum is 0."""
     cross = one.conj() * other
     size = np.abs(cross)
     return np.divide(cross, size, out=np.zeros_like(cross), where=size > 0)
 
 
 def phase_surface(phases: Spectra, side: int, radius_px: int | None = None) -> Surface:
-    """Return how far the other windows' content is moved against the ones', by their phases.
+    """Return the correlation of windows by shift of the other ones' content, from their phases.
 
     Parameters
     ----------
     phases
-        Of windows, or sums of these, shape (…, s, s // 2 + 1).
+        Phase differences of windows, or sums of them, shape (…, s, s // 2 + 1).
     side
         The windows' side s.
     radius_px
@@ -50,7 +50,7 @@ def phase_surface(phases: Spectra, side: int, radius_px: int | None = None) -> S
 
     Returns
     -------
-    Correlation by shift, of which none is in the middle, shape (…, 2 r + 1, 2 r + 1).
+    Correlation by shift, with shift 0 in the middle, shape (…, 2 r + 1, 2 r + 1).
     """
     radius = (side - 1) // 2 if radius_px is None else radius_px
     rows, columns = np.fft.fftfreq(side), np.fft.rfftfreq(side)

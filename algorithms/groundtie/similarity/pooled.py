@@ -1,10 +1,10 @@
 """Mutual information of many chips by one pooled joint histogram.
 
-A mask of the ground leaves too few pixels of a chip for a joint histogram of its own; the pixels
-of all chips are enough. From their pooled histogram follows the pointwise mutual information of a
-pair of grey levels, log p(a, b) / (p(a) p(b)), whose mean is mutual information. A chip's
-similarity at a shift is the sum over its pixels, so that chips add up: weak evidence of many
-outweighs the bias of a few.
+A ground mask leaves too few pixels of a chip for a joint histogram of its own; the pixels of all
+chips are enough. Their pooled histogram gives the pointwise mutual information of a pair of grey
+levels, log p(a, b) / (p(a) p(b)), whose mean is mutual information. A chip's similarity at a shift
+is the sum over its pixels. Chips therefore add up: weak evidence from many outweighs the bias of a
+few.
 
 Source: point similarity measures [Rogelj2003].
 """
@@ -28,10 +28,10 @@ FloatArray = NDArray[np.float32]
 
 BINS = 12
 
-# Counted for every pair of grey levels beforehand, so that none is impossible.
+# Initial count of every pair of grey levels, so that no pair has probability 0.
 _UNSEEN = 0.5
 
-# The template's speckle is averaged over so many pixels a side.
+# Side of the window over which the template's speckle is averaged.
 _SMOOTH_PX = 3
 
 
@@ -63,8 +63,8 @@ class PooledHistogram:
         template, search
             Grey values of corresponding pixels, the template's `smooth`, shape (n,).
         search_edges
-            Inner edges between levels of the second image; None: as of the first, `BINS` equally
-            frequent ones.
+            Inner edges between levels of the second image; None: `BINS` equally frequent levels, as
+            for the first.
         """
         if search_edges is None:
             search_edges = bin_edges(search, BINS)
@@ -84,14 +84,14 @@ class PooledHistogram:
         Parameters
         ----------
         template
-            The chip, or a stack of them, (…, h, w); invalid pixels take no part.
+            The chip, or a stack of chips, (…, h, w); invalid pixels take no part.
         search
             Windows with the same centres, larger by r on each side; invalid pixels add 0.
         """
         template = smooth(template)
         own = levels(template.values, self.template_edges)
         other = levels(search.values, self.search_edges)
-        # What is invalid takes a level of its own, without information.
+        # Invalid pixels get a level of their own, without information.
         own[~template.valid] = len(self.information)
         other[~search.valid] = self.information.shape[1]
         shape = fast_shape(other)
@@ -106,9 +106,9 @@ class PooledHistogram:
 
 
 def smooth(patch: Patch) -> Patch:
-    """Return a patch with its power averaged over what is valid around each pixel.
+    """Return a patch with its power averaged over the valid pixels around each pixel.
 
-    That of negative values, as of decibels, counts as negative: they stay below others.
+    The power of negative values, such as decibels, counts as negative, which keeps their order.
     """
     counts = patch.valid.astype(np.float32)
 
@@ -116,7 +116,7 @@ def smooth(patch: Patch) -> Patch:
         return np.asarray(cv2.blur(image, (_SMOOTH_PX, _SMOOTH_PX)), np.float32)
 
     signed = patch.values * np.abs(patch.values) * counts
-    # Running sums leave a little, of either sign, where all is 0.
+    # Running sums leave small values of either sign where all pixels are 0.
     least = signed.min(axis=(-2, -1), keepdims=True, initial=0)
     power = np.maximum(each(mean, signed), least)
     share = np.maximum(each(mean, counts), np.float32(1e-6))

@@ -1,7 +1,7 @@
-"""What two arrays have the same: edges, and windows that vary alike.
+"""Content that two arrays share: coinciding edges, and windows that vary alike.
 
 Independent views of one ground are similar, but hardly ever the same: noise, light, physics and
-the phase of the pixels differ. What is drawn into both arrays is the same.
+the phase of the pixels differ. Content that is drawn into both arrays is the same.
 """
 
 from __future__ import annotations
@@ -17,27 +17,29 @@ from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
 from .order_statistics import median, quantiles
 
-# Where one thing is drawn into both, their difference varies less than this share of what both
-# vary, in windows of this side; independent content would have it vary as much as both.
+# Where the same content is drawn into both arrays, the variance of their difference is at most this
+# share of the sum of their variances, in windows of this side. For independent content, the two
+# would be equal.
 _DIFFERING_SHARE = 0.5
 WINDOW_PX = 9
 REACH_PX = WINDOW_PX // 2
 
-# A variance below this share of the largest mean of squares is rounding: windows of one grey value
-# vary by none. Sums over some hundred pixels lose up to some hundred units in the last place.
+# A variance below this share of the largest mean square is rounding: sums over some hundred pixels
+# lose up to some hundred units in the last place. Windows of one grey value get variance 0.
 _ROUNDING = 1000 * np.finfo(np.float64).eps
 
-# Edges are maxima of the gradient along itself, after a Gaussian of this scale, against gradients
-# around, above such a share of them: weak ones, and strong ones. Nodata is kept so far away.
+# Edges are maxima of the gradient along its own direction, after a Gaussian of this scale and
+# relative to the gradients around. The quantiles above which they are weak, and strong. Nodata
+# is kept outside a square of side _EDGE_RIM_PX.
 _EDGE_SCALE_PX, _AROUND_PX = 0.8, 31
 _WEAK_AND_STRONG = np.array([0.6, 0.85])
 _EDGE_RIM_PX = 9
 
-# Edges are parallel within 20°, and side by side within this.
+# Edges are parallel within 20°, and opposite one another within this distance along them.
 _PARALLEL_COSINE = float(np.cos(np.deg2rad(20)))
 _ALONG_PX = 0.5
 
-# Where the nearest edge may be, and no shift, (x, y).
+# Pixels (x, y) in which the nearest edge is searched for; no shift.
 FARTHEST_PX = 2
 _EITHER_WAY = range(-FARTHEST_PX, FARTHEST_PX + 1)
 _NEIGHBOURS = np.array([(x, y) for y in _EITHER_WAY for x in _EITHER_WAY])
@@ -51,10 +53,10 @@ class Windows:
     Parameters
     ----------
     valid
-        Where both are.
+        Pixels that are valid in both.
     one, other, common
-        Variances of both, and their covariance, the other's grey values in units in which both
-        vary as much in half of the windows.
+        Variances of both, and their covariance. The grey values of `other` are scaled so that the
+        median ratio of the two variances is 1.
     """
 
     valid: Mask
@@ -79,23 +81,22 @@ class Windows:
 
     @property
     def same(self) -> Mask:
-        """Around which pixels they vary alike."""
+        """Pixels around which the patches vary alike."""
         both = self.one + self.other
         return self.valid & (both - 2 * self.common <= _DIFFERING_SHARE * both)
 
     @property
     def related(self) -> Mask:
-        """Around which pixels a linear function of one is half of the other.
+        """Pixels around which a linear function of one patch explains half of the other's variance.
 
-        As in copies, also those in other colours. Nothing follows from a single grey value, but
-        another.
+        Copies have them, also in other colours. A constant window is related to constant ones only.
         """
         alike = self.common**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other
         return self.valid & alike & ((self.one > 0) == (self.other > 0))
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """How many pixels are the same, related, and valid."""
+        """Numbers of pixels that are the same, related, and valid."""
         return int(self.same.sum()), int(self.related.sum()), int(self.valid.sum())
 
 
@@ -106,11 +107,11 @@ class Edges:
     Parameters
     ----------
     found, strong
-        Which pixels hold one, and which a strong one, shape (h, w).
+        Pixels with an edge, and with a strong one, shape (h, w).
     x, y
         Unit normals, shape (h, w) each.
     offset
-        How far along its normal each is from the middle of its pixel, in pixels, shape (h, w).
+        Distance of each edge from its pixel's centre along its normal, in pixels, shape (h, w).
     """
 
     found: Mask
@@ -121,9 +122,9 @@ class Edges:
 
     @classmethod
     def of(cls, patch: Patch) -> Edges:
-        """Return the edges of a patch, as faint as they are among what is around them [Canny1986].
+        """Return the edges of a patch, by their height above the gradients around [Canny1986].
 
-        Bright or dark, as the same may be drawn in other colours.
+        The sign of the contrast is ignored: the same content may be drawn in other colours.
         """
         values = np.where(patch.valid, patch.values, 0).astype(np.float32)
         smooth = cv2.GaussianBlur(values, (0, 0), _EDGE_SCALE_PX)
@@ -147,38 +148,38 @@ class Edges:
 
     @property
     def strongest(self) -> Edges:
-        """The strong ones alone."""
+        """The strong edges alone."""
         return replace(self, found=self.strong)
 
     def inner(self, rim_px: int) -> Edges:
-        """Return those that are farther from the rim of the patch."""
+        """Return the edges that are at least `rim_px` from the rim of the patch."""
         kept = np.zeros_like(self.found)
         kept[rim_px:-rim_px, rim_px:-rim_px] = self.found[rim_px:-rim_px, rim_px:-rim_px]
         return replace(self, found=kept, strong=self.strong & kept)
 
 
 def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -> FloatImage:
-    """Return how far edges are from the nearest parallel ones of another image.
+    """Return the distances of edges from the nearest parallel edges of another image.
 
     Parameters
     ----------
     one
         The edges, n of them.
     other
-        Those of the other image, of the same shape.
+        Edges of the other image, of the same shape.
     shifts
-        How many columns and rows (x, y) further on the other image is looked at, shape (k, 2).
+        Columns and rows (x, y) by which the other image is read further on, shape (k, 2).
 
     Returns
     -------
     Shape (k, n), in the order of `np.nonzero(one.found)`, in pixels along the gradients of `one`,
-    negative on their darker side; infinite where there is none within two pixels or so.
+    negative on their darker side; infinite without a parallel edge within two pixels or so.
     """
     reach = int(np.abs(shifts).max()) + FARTHEST_PX
     width = one.found.shape[1] + 2 * reach
     is_found = np.pad(other.found, reach).ravel()
     rows, cols = np.nonzero(one.found)
-    # Of all shifts, neighbours and edges, (k, 25, n), those where the other has an edge: few.
+    # The few of all shifts, neighbours and edges, (k, 25, n), at which the other has an edge.
     step = (shifts[:, None] + _NEIGHBOURS) @ np.array([1, width])
     at = step[..., None] + ((rows + reach) * width + cols + reach)
     hits = np.flatnonzero(is_found.take(at))
@@ -192,7 +193,7 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
     is_parallel = np.abs(x * other_x + y * other_y) >= _PARALLEL_COSINE
     pairs = np.flatnonzero(is_parallel & (np.abs(right * y - down * x) <= _ALONG_PX))
     apart = (right * x + down * y)[pairs]
-    # Of several, the nearest is set last.
+    # The nearest of several is assigned last.
     order = np.argsort(-np.abs(apart), kind="stable")
     along = np.full((len(shifts), len(rows)), np.inf, np.float32)
     along[which[pairs][order], edge[pairs][order]] = apart[order]
@@ -200,15 +201,15 @@ def edges_apart_px(one: Edges, other: Edges, shifts: NDArray[np.int_] = _NONE) -
 
 
 def covered(middles: Mask, side_px: int) -> Mask:
-    """Return all pixels of windows of a side around some."""
+    """Return all pixels of the windows of a side around the given pixels."""
     window = np.ones((side_px, side_px), np.uint8)
     return np.asarray(cv2.dilate(middles.astype(np.uint8), window) > 0)
 
 
 def _variance(values: FloatArray, mean: FloatArray, share: FloatArray) -> FloatArray:
-    """Return the variance of values in windows around pixels, 0 where it is but rounding, (h, w).
+    """Return the variance of values in windows around pixels, 0 where it is rounding, (h, w).
 
-    `share` is that of the windows' pixels that are valid; the values of others are 0.
+    `share` is the valid share of each window; the values of invalid pixels are 0.
     """
     squares = _mean(values**2) / share
     variance = squares - mean**2

@@ -1,7 +1,7 @@
-"""Steps between neighbouring columns, or rows, that both arrays have: seams of mosaics and tiles.
+"""Steps between neighbouring columns, or rows, that both arrays have: seam lines of mosaics, tiles.
 
-What is drawn steps from one pixel to the next, along many of them. Edges of the ground are blurred,
-and those of two images seldom follow one column.
+Drawn content steps from one pixel to the next, along many pixels. Edges of the ground are blurred,
+and seldom follow the same column in two images.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from ..rasters.reading import FloatImage, Mask
 from .order_statistics import DEVIATION_PER_MAD, median
 from .orientation import compress
 
-# Steps are means along about so many pixels, as high as the windows that are looked at, of which
-# this share must be known, in robust standard deviations; no more of them count, so that no single
-# one decides.
+# Steps are means along about this many pixels, the height of the compared windows; this share of
+# the pixels must be valid. They are in robust standard deviations, clipped so that no single step
+# decides.
 _ALONG_PX, _LEAST_KNOWN, _MOST_DEVIATIONS = 96, 1 / 3, 8.0
 
-# How many columns further on one array's steps are compared with the other's. What is this far off
-# coincides by chance.
+# Largest lag, in columns, at which the steps of both arrays are compared. Steps coincide by chance
+# at lags beyond _NEAR.
 _LAGS, _NEAR = 16, 3
 _LAG = np.arange(-_LAGS, _LAGS + 1)
 
-# What is so many standard deviations more is exceeded by chance with 5 %.
+# An upper limit at this many standard deviations is exceeded by chance with 5 %.
 ONE_SIDED_5_PERCENT = 1.645
 
-# Steps of what is drawn are no wider. Suite sharpness: of different sensors' ground at its place
-# from 0.51 on; of seams, stripes and lines of maps from 0.04 on, mostly below this.
+# Steps of drawn content are no wider. Suite sharpness: from 0.51 on for ground of different sensors
+# at its right place; from 0.04 on, mostly below this limit, for seams, stripes and map lines.
 DRAWN_WIDTH = 0.3
 
-# Steps from so many standard deviations on, in both, are masked: one in 370 is as high by chance.
+# Steps of at least this many standard deviations in both arrays are masked; one in 370 is as high
+# by chance.
 _MASKED_DEVIATIONS = 3.0
 
 
@@ -49,10 +50,10 @@ def step_products(reference: Patch, input: Patch) -> NDArray[np.float64]:
 
 
 def step_width(products: NDArray[np.floating]) -> float:
-    """Return how wide the steps are that two arrays have in common; infinite: they have none.
+    """Return the width of the steps that two arrays have in common; infinite if they have none.
 
-    That is how well they coincide one column or row beside where they do best, as a share of that,
-    beyond chance; at most, but by chance with 5 %.
+    The width is the sum of products one column or row beside the best lag over that at the best
+    lag, both beyond chance. It is an upper limit, exceeded by chance with 5 %.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def step_width(products: NDArray[np.floating]) -> float:
 
 
 def seams(reference: Patch, input: Patch) -> Mask:
-    """Return the pixels of rows and columns beside which both patches step, shape (h, w)."""
+    """Return the pixels on both sides of the steps that both patches have, shape (h, w)."""
     found = np.zeros(reference.values.shape, bool)
     for mask, one, other in zip(
         (found, found.T), _both_ways(reference), _both_ways(input), strict=True
@@ -101,7 +102,7 @@ def _steps(values: FloatImage, valid: Mask) -> FloatImage:
         variance = np.einsum("ij,ij->j", rise, rise) / count - mean**2
         deviation = np.sqrt(np.maximum(variance, np.finfo(np.float32).eps) / count)
         steps = np.where(count >= _LEAST_KNOWN * len(known), mean / deviation, 0)
-        # Ground varies along rows alike, so that its steps are many deviations high.
+        # Ground is correlated along a step, so that its steps are many standard deviations high.
         spread = max(DEVIATION_PER_MAD * float(median(np.abs(steps))), 1.0)
         found.append(np.clip(steps / spread, -_MOST_DEVIATIONS, _MOST_DEVIATIONS))
     return np.array(found, np.float32)

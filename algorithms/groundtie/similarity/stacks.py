@@ -1,7 +1,7 @@
 """Stacks of images of one size, shape (…, h, w), for functions that take one image at a time.
 
 Functions of this package take single images, (h, w), and stacks of them alike. A stack of chips is
-worked at once: many small calls would cost more than what they compute.
+processed in one call: many small calls would cost more than their computation.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ Array = NDArray[Any]
 
 
 def each(function: Callable[..., Array], *stacks: Array) -> Array:
-    """Return what a function makes of the images of stacks, (…, h, w), one after the other.
+    """Apply a function to the images of stacks, (…, h, w), one after the other.
 
     Parameters
     ----------
     function
-        Takes an image of each stack and returns an array of always the same shape.
+        Takes one image of each stack; returns arrays of one shape.
     stacks
-        All of the same leading shape.
+        Stacks of the same leading shape.
     """
     leading = stacks[0].shape[:-2]
     images = (stack.reshape(-1, *stack.shape[-2:]) for stack in stacks)
-    # Not np.stack, which takes as long as what some functions make.
+    # Not np.stack, which takes as long as some of the functions.
     made = np.array([function(*of_one) for of_one in zip(*images, strict=True)])
     return made.reshape(leading + made.shape[1:])
 

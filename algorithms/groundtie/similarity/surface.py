@@ -1,7 +1,7 @@
 """The similarity surface of a template over shifts in its search window.
 
-Surfaces are normalised to robust standard deviations of their own background, so that those of
-different measures can be added and peaks of different places be compared.
+Surfaces are normalised to robust standard deviations of their own background, so that surfaces of
+different measures can be added and peaks of different places compared.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .stacks import each, flat
 Surface = NDArray[np.float32]
 Known = NDArray[np.bool_]
 
-# The measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
-# docs/measurements.md has the figures of these and of others.
+# Measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
+# docs/measurements.md has the figures of these and of other choices.
 _FUSED = "fused"
 _WEIGHTS = {"nmi": 0.75, "orientation": 1.0, "edge-strength": 0.75}
 
 SIMILARITIES = (_FUSED, *MEASURES)
 
-# A surface's slow trend, which is no evidence of a peak, is its Gaussian mean of this width.
+# Width of the Gaussian mean that is a surface's slow trend, which is no evidence of a peak.
 TREND_PX = 5.0
 
 # A surface that varies by less than this holds nothing but rounding.
@@ -40,7 +40,7 @@ _FLAT = 1e-9
 
 @dataclass(frozen=True)
 class SimilaritySettings:
-    """How similarity is measured.
+    """Settings of the similarity measurement.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class SimilaritySettings:
         return tuple(_WEIGHTS) if self.similarity == _FUSED else (self.similarity,)
 
     def bins_for(self, pixels: int) -> int:
-        """Return the number of bins for a template of so many pixels."""
+        """Return the number of bins for a template with this number of pixels."""
         # Measured on real SAR–optical pairs: 8 to 10 bins for 61 px chips, up to 32 for scenes.
         return self.bins or int(np.clip(np.sqrt(pixels) / 7.5, 8, 32))
 
@@ -73,7 +73,7 @@ def normalise(surface: Surface, known: Known | None = None) -> Surface:
     surface
         The surfaces.
     known
-        At which shifts they have a value, same shape; others get 0, the background's. None: at all.
+        Shifts that have a value, same shape; others get 0, the background's. None: all shifts.
     """
     if known is None or known.all():
         return _normalised(surface)
@@ -95,7 +95,7 @@ def _normalised(surface: Surface) -> Surface:
 def _normalised_where(surface: Surface, known: Known) -> Surface:
     found = np.zeros(surface.shape, np.float32)
     if known.any():
-        # As an image of one row.
+        # The known values are normalised as an image of one row.
         found[known] = _normalised(surface[known][None])[0]
     return found
 
@@ -114,7 +114,7 @@ def _smooth(surface: Surface) -> Surface:
 def describe(
     window: Patch, chip_pixels: int, settings: SimilaritySettings, memo: Memo | None = None
 ) -> Description:
-    """Return what similarity is measured on.
+    """Return the description of a window for the similarity measures.
 
     Parameters
     ----------
@@ -123,9 +123,9 @@ def describe(
     chip_pixels
         Number of pixels of the template that will be matched.
     settings
-        How similarity is measured.
+        Settings of the measurement.
     memo
-        Keeps descriptions; None: it is not asked for again.
+        Keeps descriptions; None: the description is not needed again.
     """
     bins = settings.bins_for(chip_pixels)
     if memo is None:
@@ -154,17 +154,17 @@ def similarity_surface(
     radius
         Largest shift, in pixels.
     settings
-        How similarity is measured.
+        Settings of the measurement.
     context
-        Threads to count histograms in; by default the calling one alone.
+        Threads to count histograms in; by default the calling thread alone.
     least_overlap
         Share of the template's valid pixels that must lie on valid ones.
 
     Returns
     -------
-    Surface, shape (…, 2 radius + 1, 2 radius + 1), float32: rows and columns by which the search
-    window's content lies further down and right than the template's. Shifts with too little
-    overlap get 0, the background's value.
+    Surface, shape (…, 2 radius + 1, 2 radius + 1), float32. A shift is the rows and columns by
+    which the search window's content lies further down and right than the template's. Shifts with
+    too little overlap get 0, the background's value.
     """
     shape = *template.patch.values.shape[:-2], 2 * radius + 1, 2 * radius + 1
     total, known = np.zeros(shape, np.float32), None
@@ -179,6 +179,6 @@ def similarity_surface(
 
 def _standardised(values: NDArray[np.floating], known: Known | None) -> Surface:
     """Return the detrended sum of one or several surfaces of a measure, each normalised."""
-    # Where a scale has no valid pixels to compare, it is 0.
+    # A scale without valid pixels to compare has the value 0.
     parts = detrend(values, None if known is None else known & (values != 0))
     return parts[0] if len(parts) == 1 else normalise(parts.sum(axis=0), known)

@@ -1,4 +1,4 @@
-"""What one image shows beyond what another one explains of it."""
+"""Residual of one image after a local linear regression on another one."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask
 from .stacks import each
 
-# One image explains the other by a line through their grey values in windows of this side: wide
-# enough that ground which lies elsewhere is hardly explained by chance (1 / 15² of its variance
-# each for slope and mean), and narrow enough for light that changes.
+# The regression is a line through both images' grey values in windows of this side: wide enough
+# that displaced ground is hardly explained by chance (1 / 15² of its variance each for slope and
+# mean), and narrow enough to follow changes of light.
 WINDOW_PX = 15
 
-# A variance of less than this share of the mean square is rounding, and explains nothing.
+# A variance below this share of the mean square is rounding, and explains nothing.
 _LEAST_SHARE = 1e-6
 
-# What is left of less than this share of the variance is rounding or noise, and shows no ground.
+# A residual below this share of the variance is rounding or noise, and shows no ground.
 _LEAST_LEFT = 0.01
 
 
 def unexplained(reference: Patch, input: Patch) -> Patch:
-    """Return stacks of windows of an input without what those of the reference explain of it.
+    """Return windows of an input without the content that the reference's windows explain.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _blurred(stack: FloatImage | Mask) -> FloatImage:
 
 
 def _centred(values: FloatImage, valid: Mask) -> FloatImage:
-    """Return values about a middle: of squares of large ones, small differences lose digits."""
+    """Return values less a common middle: squares of large values lose small differences."""
     some = (..., slice(None, None, WINDOW_PX), slice(None, None, WINDOW_PX))
     sample = values[some][valid[some]]
     middle = np.median(sample) if sample.size else 0.0
