@@ -3,7 +3,7 @@
 The residual of a check point is not the error of the transform: it includes the matching error of
 the point itself. The error of the transform has three sources: its variation with the choice of
 points (jackknife), the residual that neighbouring check points share, and displacements common to
-all points. The latter come from heights, as far as the ground's heights are uncertain.
+all points. The latter are due to heights, and to their residual effect if the ground is uncertain.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def sigma_range_px(max_error_px: float) -> tuple[float, float]:
     """Return the range allowed for the standard deviation of held-out inliers, in pixels.
 
     The upper limit exceeds the deviation of the largest allowed error, so that larger errors are
-    still measured. A stricter limit on the error does not lower it: errors do not depend on it.
+    still measured. It is at least that of the usual limit: errors do not depend on the limit set.
     """
     largest = _SIGMA_BEYOND * max(max_error_px, USUAL_MAX_ERROR_PX) / math.sqrt(2)
     return SMALLEST_PX, largest

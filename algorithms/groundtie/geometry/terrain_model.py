@@ -114,7 +114,7 @@ class TerrainModel(Model):
         Parameters
         ----------
         values
-            What `to_json` returned.
+            Result of `to_json`.
         frame
             Frame of the coefficients.
         crs

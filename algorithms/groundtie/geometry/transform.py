@@ -153,7 +153,7 @@ class Transform:
         Parameters
         ----------
         values
-            What `to_json` returned.
+            Result of `to_json`.
         folder
             Folder to search for terrain models that are no longer at their stored path.
 
@@ -217,7 +217,7 @@ def model_from_json(
     Parameters
     ----------
     values
-        What `to_json` returned.
+        Result of `to_json`.
     crs
         CRS of the map.
     folder

@@ -83,7 +83,7 @@ class Lattice:
         """Return the values at all pixels of some rows, shape (k, rows, width)."""
         nodes = self._lines[:, rows]
         count, height, width = nodes.shape
-        # Resizing takes nodes as the centres of cells, which is what they are.
+        # Resizing takes nodes as the centres of cells, as they are.
         whole = cv2.resize(nodes.reshape(-1, width), (width * self.step, count * height))
         within = slice(self.step, self.step + self.grid.width)
         return np.asarray(whole.reshape(count, height, -1)[..., within])
@@ -101,7 +101,7 @@ class Lattice:
         return px
 
     def window(self) -> Window | None:
-        """Return the window whose pixels the grid's coincide with, if values are pixel positions.
+        """Return the window of pixels that coincide with the grid's, if values are pixel positions.
 
         None: the positions lie between pixels, or are not those of adjacent pixels.
         """
@@ -152,7 +152,7 @@ def row_strips(height: int, width: int) -> Iterator[slice]:
 
 
 def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_PX) -> Lattice:
-    """Evaluate a function on a lattice, refined until midway interpolation errors are tolerable.
+    """Evaluate a function on a lattice, refined until it interpolates well midway between nodes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numbers without data: those that GDAL equates with the nodata value, and non-measurements."""
+"""Recognition of nodata: numbers that GDAL equates with the nodata value, and non-measurements."""
 
 from __future__ import annotations
 

@@ -51,8 +51,8 @@ class Image:
         A raster on the same map. Image pixels at which it is 0 or has no data do not take part.
         None: all valid pixels take part.
     mask_span
-        Columns and rows of the mask that must all take part for a matching pixel to do so: those
-        that the matching pixel spans (see `masked`).
+        Columns and rows of the mask that a matching pixel spans: all must take part for the
+        matching pixel to do so (see `masked`).
     mask_note
         Note on the mask for the user.
     mask_hides
