@@ -1,1 +1,1 @@
-"""Geometry: tie points, transforms between images, and how these are fitted."""
+"""Geometry: tie points, transforms between images, and their estimation."""

@@ -1,9 +1,9 @@
-"""How accurate a transform is at a random place: a prediction from what its points show.
+"""Prediction of a transform's accuracy at a random place, from its tie points and check points.
 
-Residuals of check points are no errors of the transform: each holds its own matching error, too.
-What the transform errs by is what it would change by with other points (jackknife), what
-neighbouring check points have in common, and what displaces all points alike: heights, and what
-of them is left where the ground is not known for sure.
+The residual of a check point is not the error of the transform: it includes the matching error of
+the point itself. The error of the transform has three sources: its variation with the choice of
+points (jackknife), the residual that neighbouring check points share, and displacements common to
+all points. The latter are due to heights, and to their residual effect if the ground is uncertain.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from .estimation import jackknife_deviations
 from .judging import CE90_FACTOR
 from .misses import Misses
 
-# Points at a side or a corner of each other are neighbours: √2 spacings are the farthest.
+# Lattice points adjacent along a side or a diagonal are neighbours: at most √2 spacings apart.
 NEIGHBOUR_SPACINGS = 1.5
 
-# A quantile of so many draws at each place is good to 1 or 2 %.
+# With this many draws at each place, quantiles are accurate to 1 or 2 %.
 _DRAWS = 1000
 
-# Fewer inliers than this, by their weights, are none.
+# A smaller sum of inlier weights counts as no inlier.
 _LEAST_WEIGHT = 1e-9
 
-# The interval holds the true figure with this probability.
+# Probability that the interval contains the true figure.
 _CONFIDENCE = 0.9
 
 
@@ -42,9 +42,9 @@ class Ellipse:
     Parameters
     ----------
     major_px, minor_px
-        Its semi-axes.
+        Semi-axes.
     angle_deg
-        Direction of the longer one, clockwise from the top of the grid, 0 to 180.
+        Direction of the major axis, clockwise from the top of the grid, 0 to 180.
     """
 
     major_px: float
@@ -73,13 +73,13 @@ class Accuracy:
     Parameters
     ----------
     ce50_px, ce90_px, ce95_px
-        With probabilities of 50, 90 and 95 %.
+        Radii that hold the error with probabilities of 50, 90 and 95 %.
     ce90_range_px
-        Interval that holds `ce90_px` with 90 %: it is known from few points only.
+        Interval that contains `ce90_px` with a probability of 90 %; few points leave it uncertain.
     ellipse
-        How the errors lie about the place.
+        Distribution of the errors about the place.
     heights_px
-        How much of the error heights may make, the same at all places.
+        Contribution of heights to the error, at most; the same at all places.
     """
 
     ce50_px: float
@@ -95,14 +95,14 @@ UNKNOWN = Accuracy(math.nan, math.nan, math.nan, (math.nan, math.nan))
 
 @dataclass(frozen=True)
 class Common:
-    """What displaces all points alike, so that no check point shows it.
+    """Displacements common to all points, which check points cannot reveal.
 
     Parameters
     ----------
     heights_px
-        The most that heights may displace all points by, to either side, shape (2,).
+        Largest displacement of all points by heights, to either side, shape (2,).
     sigma_px
-        Standard deviation along an axis of a displacement in any direction.
+        Standard deviation along an axis of an isotropic displacement.
     """
 
     heights_px: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -114,22 +114,22 @@ NOTHING_COMMON = Common()
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """What is known of the error of a transform, by its points.
+    """The error of a transform, modelled from its points.
 
-    Its random part is that of the models without one block of points after the other
-    ([Efron1993]), with the mean of two variances at the check points: theirs, and what the check
-    points share. It has Student's distribution, with one degree of freedom less than there are
-    blocks. Its common part is what heights displace all points by, evenly up to the largest, and
-    a normal displacement in any direction.
+    The random part follows the scatter of the models that each leave out one block of points
+    ([Efron1993]). Its variance is the mean of two variances at the check points: that of these
+    models, and that which neighbouring check points share. It has Student's distribution, with one
+    degree of freedom less than there are blocks. The common part displaces all points: uniformly
+    distributed up to the largest displacement by heights, plus an isotropic normal displacement.
 
     Parameters
     ----------
     fold_models
-        The models without one block of points after the other, between pixel positions.
+        Models that each leave out one block of points, between pixel positions.
     check
-        Points that took no part.
+        Points that took no part in the fit.
     common
-        What displaces all points alike.
+        Displacements common to all points.
     """
 
     fold_models: Sequence[PointFunction]
@@ -138,7 +138,7 @@ class ErrorModel:
 
     @property
     def is_unknown(self) -> bool:
-        """Whether there are too few blocks, or no check points, to predict anything by."""
+        """Whether there are too few blocks, or no check points, for a prediction."""
         return len(self.fold_models) < 2 or len(self.check.px) == 0
 
     def accuracy(self, places_px: FloatArray) -> Accuracy:
@@ -153,7 +153,7 @@ class ErrorModel:
         parts = random.standard_normal((_DRAWS, count)) * factor
         moved = np.einsum("dk,kmx->dmx", parts, deviations)
         alike = random.uniform(-1, 1, (_DRAWS, 1, 1)) * common.heights_px
-        # So few blocks know their variance badly: Student's distribution.
+        # A few blocks determine their variance poorly: hence Student's distribution.
         known = random.chisquare(count - 1, (_DRAWS, 1, 1)) / (count - 1)
         alike = alike + random.normal(0, common.sigma_px, (_DRAWS, 1, 2))
 
@@ -167,7 +167,7 @@ class ErrorModel:
             radii(math.sqrt(freedom / (2 * float(gammaincinv(freedom / 2, share)))), (0.9,))[0]
             for share in ((1 + _CONFIDENCE) / 2, (1 - _CONFIDENCE) / 2)
         )
-        # Heights displace evenly between both limits.
+        # Variance of the uniform distribution of the displacement by heights.
         covariance = factor**2 * np.einsum("kmx,kmy->xy", deviations, deviations) / len(places_px)
         covariance += np.outer(common.heights_px, common.heights_px) / 3
         covariance += common.sigma_px**2 * np.eye(2)
@@ -183,13 +183,13 @@ class ErrorModel:
     def standard_deviation_px(self, places_px: FloatArray) -> FloatArray:
         """Return the standard deviation of the error along an axis at places, shape (m,).
 
-        What `accuracy` draws from, without what so few blocks leave unknown of the variance;
-        infinite where that predicts nothing.
+        This is the deviation that `accuracy` draws from, without the widening for the uncertainty
+        of a variance from few blocks. Infinite if the error is unknown.
         """
         if self.is_unknown:
             return np.full(len(places_px), np.inf)
         random = (self._deviations(places_px) ** 2).sum(axis=0).mean(axis=-1) * self._factor**2
-        # Heights: of an even distribution between both limits.
+        # Variance of the uniform distribution of the displacement by heights.
         alike = float((self.common.heights_px**2).mean()) / 3 + self.common.sigma_px**2
         return np.asarray(np.sqrt(random + alike))
 
@@ -202,25 +202,25 @@ class ErrorModel:
 
     @cached_property
     def _block_variance_px2(self) -> float:
-        """Mean variance along an axis that blocks of points leave at the check points."""
+        """Mean jackknife variance along an axis at the check points."""
         return float((self._deviations(self.check.px) ** 2).sum(axis=0).mean())
 
     @cached_property
     def _factor(self) -> float:
-        """By how much deviations are larger than those of blocks show.
+        """Ratio of the predicted deviations to those of the jackknife.
 
-        Their variance is the mean of what blocks show and of what check points share.
+        The predicted variance is the mean of the jackknife's and of that which check points share.
         """
         blocks, shared = self._block_variance_px2, self._shared[0]
         return 1.0 if blocks <= 0 else math.sqrt((blocks + shared) / (2 * blocks))
 
 
 def shared_by_neighbours(check: Misses) -> tuple[float, float]:
-    """Return the variance along an axis of what neighbours have in common, and that of its noise.
+    """Return the variance along an axis that neighbours share, and the variance of its noise.
 
-    The first is 0 without neighbours. The matching errors of two points are independent, so that
-    the mean product of their residuals is the variance of what they share: the error of the
-    transform. Points count by their probabilities to be inliers.
+    The shared variance is 0 without neighbours. The matching errors of two points are independent,
+    so that the mean product of their residuals is the variance of the part they share: the error
+    of the transform. Points are weighted by their probabilities to be inliers.
     """
     weights, residuals = check.mixture.probability, check.residuals_px
     pairs = np.outer(weights, weights) * _are_neighbours(check.px)
@@ -244,10 +244,11 @@ def _are_neighbours(px: FloatArray) -> Mask:
 def _degrees_of_freedom(
     blocks_px2: float, count: int, shared_px2: float, noise_px4: float
 ) -> float:
-    """Return those of the mean of the two variances, by their own variances ([Satterthwaite1946]).
+    """Return the degrees of freedom of the mean of the two variances ([Satterthwaite1946]).
 
-    What all check points share was drawn once, along two axes, and is found among the noise of the
-    products of neighbours. No fewer than Student's distribution has, as noise is no variance.
+    The error that all check points share is a single draw along two axes, estimated amid the noise
+    of the neighbours' products. The result is no fewer than Student's distribution has: that noise
+    must not reduce it further.
     """
     by_check = shared_px2**2 + noise_px4
     total = blocks_px2**2 / (count - 1) + by_check

@@ -1,8 +1,8 @@
-"""How likely matches that fell anywhere would agree as well as these do (a contrario reasoning).
+"""Probability that random matches agree as well as the observed ones (a contrario reasoning).
 
-A match by chance falls anywhere in its search window, and within the tolerance of a model
-with probability p = tolerance area / window area. That at least k of n such matches agree is a
-binomial tail ([Moisan2004]).
+A random match is distributed uniformly over its search window. It falls within the tolerance of a
+model with probability p = tolerance area / window area. The probability that at least k of n such
+matches agree is a binomial tail ([Moisan2004]).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def agreement_probability(tolerance_px: float, radius_px: int) -> float:
 
 
 def log10_chance(agreeing: int, total: int, probability: float) -> float:
-    """Return log10 of the probability that so many of `total` random matches agree, or more."""
+    """Return log10 of the probability that `agreeing` or more of `total` random matches agree."""
     if total == 0 or agreeing == 0:
         return 0.0
     count = np.arange(agreeing, total + 1)
@@ -39,16 +39,16 @@ def log10_chance(agreeing: int, total: int, probability: float) -> float:
 
 
 def log10_false_alarms(agreeing: int, total: int, probability: float, sample: int) -> float:
-    """Return log10 of the expected number of random models that so many matches would agree with.
+    """Return log10 of the expected number of random models with at least as many agreeing matches.
 
     Parameters
     ----------
     agreeing, total
-        Matches that agree, and all matches, those that define the model included.
+        Numbers of agreeing matches and of all matches, each with those that define the model.
     probability
-        That a random match agrees.
+        Probability that a random match agrees.
     sample
-        Matches that define a model; each such subset is a model that was tried.
+        Number of matches that define a model; each such subset counts as a model tried.
     """
     if agreeing <= sample:
         return math.inf
@@ -58,17 +58,16 @@ def log10_false_alarms(agreeing: int, total: int, probability: float, sample: in
 
 
 def log10_least_false_alarms(lengths_px: FloatArray, area_px2: float, sample: int) -> float:
-    """Return that of matches with residuals of some lengths, shape (n,), n > `sample`.
+    """Return `log10_false_alarms` at the tolerance radius that minimises it.
 
-    They agree within whatever radius is the least likely, of all that were tried; those of NaN
-    within none.
+    The number of radii tried is accounted for. Matches with a length of NaN agree at no radius.
 
     Parameters
     ----------
     lengths_px
-        Lengths of the residuals.
+        Lengths of the residuals, shape (n,), n > `sample`.
     area_px2
-        Area in which matches by chance fall anywhere.
+        Area over which random matches are distributed.
     sample
         See `log10_false_alarms`.
     """

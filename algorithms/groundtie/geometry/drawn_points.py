@@ -1,4 +1,4 @@
-"""Tie points as lines on a map: what a person moved or drew there counts over the columns."""
+"""Tie points as lines on a map: lines that a person moved or drew override the columns."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from ..rasters.grid import FloatArray, Grid, reproject
 from .point_tables import INPUT, NOMINAL, PIXEL, REFERENCE, Row, columns
 from .vector_layers import simple_geometries
 
-# GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), doubles have 15
-# digits: what differs by no more was not moved.
+# GeoJSON is usually written with 7 decimals of a degree (RFC 7946, section 11.2), and doubles have
+# 15 digits: a smaller difference does not mean that a point was moved.
 _RELATIVE, _ABSOLUTE = 1e-9, 1e-7
 
 
 def line_ends(geometries: Sequence[Any]) -> FloatArray:
     """Return the first and the last position of lines, shape (n, 2, 2).
 
-    NaN stands for what is no line, such as a row without a geometry, or an empty one.
+    NaN if there is no line: a missing or empty geometry, or one of another type.
 
     Parameters
     ----------
     geometries
-        As GeoJSON has them, or None.
+        Geometries as in GeoJSON, or None.
 
     Raises
     ------
     TypeError, ValueError
-        A line has several parts, or a position has not two numbers.
+        A line has several parts, or a position lacks two numbers.
     """
     ends = np.full((len(geometries), 2, 2), np.nan)
     for end, geometry in zip(ends, geometries, strict=True):
@@ -44,7 +44,7 @@ def line_ends(geometries: Sequence[Any]) -> FloatArray:
 
 
 def _line_parts(geometry: Any) -> list[Any]:
-    """Return the coordinates of a geometry's parts, without empty ones, if it is a line."""
+    """Return the coordinates of the non-empty parts of a line; none for other geometries."""
     kind = str(geometry["type"])
     if not kind.endswith("LineString"):
         return []
@@ -56,14 +56,14 @@ def _line_parts(geometry: Any) -> list[Any]:
 def follow_lines(
     rows: list[Row], ends: FloatArray, layer_crs: CRS | None, crs: CRS | None, input_grid: Grid
 ) -> tuple[list[Row], NDArray[np.bool_]]:
-    """Return the rows of a table with the positions that their lines have.
+    """Return the rows of a table with the positions of their lines.
 
     Parameters
     ----------
     rows
         The table.
     ends
-        Nominal and reference position of each row's line, shape (n, 2, 2); NaN: it has none.
+        Nominal and reference position of each row's line, shape (n, 2, 2); NaN: no line.
     layer_crs, crs
         CRS of the lines, and of the map positions in the table.
     input_grid
@@ -72,7 +72,7 @@ def follow_lines(
     Returns
     -------
     list
-        The table; what agrees with its line is as it was.
+        The table; rows that agree with their line are unchanged.
     NDArray
         Which rows follow a line that was moved or drawn, shape (n,).
 
@@ -84,7 +84,7 @@ def follow_lines(
     stated = np.stack([columns(rows, *NOMINAL), columns(rows, *REFERENCE)], axis=1)
     drawn = np.asarray(np.isfinite(ends).all(axis=(1, 2)))
     moved = drawn[:, None] & ~_same(ends, _projected(stated, crs, layer_crs))
-    # A table that locates its points in the input otherwise has no nominal positions to compare.
+    # A row that locates its point by input coordinates may have no nominal position to compare.
     elsewhere = np.isfinite(columns(rows, *INPUT)) | np.isfinite(columns(rows, *PIXEL))
     moved[:, 0] &= np.isfinite(stated[:, 0]).all(1) | ~elsewhere.all(1)
     on_map = _projected(ends, layer_crs, crs)
@@ -114,7 +114,7 @@ def _same(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
 
 
 def _projected(places: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:
-    """Return positions, shape (n, 2, 2), in another CRS; what is not finite is NaN."""
+    """Return positions, shape (n, 2, 2), in another CRS; non-finite ones become NaN."""
     known = np.isfinite(places).all(axis=-1)
     found = np.full_like(places, np.nan)
     found[known] = reproject(places[known], source, target)

@@ -1,4 +1,4 @@
-"""An estimate of a transform, how it varies with its points, and the thin-plate spline's fit."""
+"""Estimates of a transform, their variation with the points, and the fit of thin-plate splines."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class Fitted:
     Parameters
     ----------
     model
-        From pixel positions of the matching grid to where the input nominally has them, in pixels
-        of the same grid.
+        From pixel positions of the matching grid to the input's nominal positions, in pixels of
+        the same grid.
     fold_models
-        The same fitted without one block of points after the other, to infer how the model varies.
+        The same kind of model, each fitted without one block of points, for the jackknife.
     """
 
     model: Model
@@ -38,14 +38,14 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A transform, and what it was estimated from.
+    """A transform, and the points that it was estimated from.
 
     Parameters
     ----------
     transform
         The transform.
     points
-        The points of the fit, with those that it rejected.
+        The points of the fit, rejected ones included.
     fold_models
         See `Fitted`.
     """
@@ -58,14 +58,14 @@ class Estimate:
     def of(
         cls, kind: str, fitted: Fitted, points: TiePoints, pair: ImagePair, radius_px: float
     ) -> Estimate:
-        """Return the estimate by a fitted model, or by the spline that the points bend it to.
+        """Return the estimate by a fitted model, or by a thin-plate spline that starts from it.
 
         Parameters
         ----------
         kind
-            Of the model that was asked for.
+            Kind of the model requested.
         fitted
-            The model, or what a spline starts from.
+            The model, or the start of the spline's fit.
         points
             Points of the fit.
         pair
@@ -86,10 +86,10 @@ class Estimate:
         return cls(transform, points, fitted.fold_models)
 
     def folds_on(self, grid: Grid) -> tuple[PointFunction, ...]:
-        """Return the models of the folds in pixels of the matching grid of the reference.
+        """Return the folds' models in pixels of the matching grid on the reference.
 
-        But for what is common to all. Nominal pixels, which the transform may scale and rotate,
-        are others.
+        Only differences between the models are meaningful, not what is common to all of them. The
+        models predict nominal pixels, which the transform may scale and rotate.
         """
         matrix = self.transform.onto_reference(grid)
 
@@ -102,9 +102,9 @@ class Estimate:
 def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) -> FloatArray:
     """Return the standard deviation of predictions, shape (n,), at positions, shape (n, 2).
 
-    Both axes together. Infinite for fewer than two models, each of which was fitted without one
-    block of neighbouring points: so it grows where the points do not hold the model. Source:
-    [Efron1993], chapter 11.
+    The deviation is that of both axes together, and infinite for fewer than two models. Each model
+    was fitted without one block of neighbouring points, so that the deviation grows where the
+    points constrain the model poorly. Source: [Efron1993], chapter 11.
     """
     if len(fold_models) < 2:
         return np.full(len(at_px), np.inf)
@@ -115,7 +115,7 @@ def jackknife_spread(fold_models: Sequence[PointFunction], at_px: FloatArray) ->
 def jackknife_deviations(estimates: Sequence[FloatArray]) -> FloatArray:
     """Return deviations, shape (n, …), of n estimates without one block each, shape (…) each.
 
-    Their products sum up to variances and covariances. Source: [Efron1993], chapter 11.
+    Sums of their products are variances and covariances. Source: [Efron1993], chapter 11.
     """
     values = np.asarray(estimates, float)
     count = len(values)
@@ -125,7 +125,7 @@ def jackknife_deviations(estimates: Sequence[FloatArray]) -> FloatArray:
 def fit_without_blocks(
     kind: str, px: FloatArray, nominal_px: FloatArray, weights: FloatArray
 ) -> tuple[Model, ...]:
-    """Return the models of a kind that leave one block of points after the other out.
+    """Return the models of a kind that each leave out one block of points.
 
     Parameters are those of `fit_model`, in pixels; all models have one frame.
 
@@ -146,7 +146,7 @@ def fit_without_blocks(
 def fit_thin_plate(
     points: TiePoints, nominal: Transform, grid: Grid, start: Model, radius_px: float
 ) -> Fitted:
-    """Fit a thin-plate spline to tie points of which some may be outliers.
+    """Fit a thin-plate spline to tie points, some of which may be outliers.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def fit_thin_plate(
     grid
         The matching grid.
     start
-        A simpler model of the same, between pixel positions of the grid.
+        A simpler model of the same displacement, between pixel positions of the grid.
     radius_px
-        How far outliers may have fallen from the truth, in matching pixels.
+        Largest distance of outliers from the true position, in matching pixels.
 
     Raises
     ------

@@ -17,11 +17,11 @@ from .models import (
     thin_plate_kernel,
 )
 
-# Stiffness of the thin-plate spline: residual variance of a point against bending energy, in
-# frame units. A knot a tenth of the scene away then sways a point's neighbourhood, not a pixel.
+# Stiffness of the thin-plate spline: residual variance of a point against bending energy, in frame
+# units. A knot then bends its neighbourhood, a tenth of the scene, rather than a single pixel.
 TPS_STIFFNESS = 1e-2
 
-# Singular values below this share of the largest are rounding errors.
+# Singular values below this share of the largest are due to rounding.
 ROUNDING = 1e-9
 
 
@@ -39,16 +39,17 @@ def fit_model(
     kind
         One of `models.KINDS`.
     xy, nominal_xy
-        Positions on the reference map and where the input nominally has them, shape (n, 2).
+        Positions on the reference map, and their nominal positions, shape (n, 2).
     weights
-        Weight of each pair, shape (n,); by default all the same. Zero leaves a pair out.
+        Weight of each pair, shape (n,); by default all equal. Zero leaves a pair out.
     frame
         Frame of the coefficients; by default the one around `xy`.
 
     Raises
     ------
     TooFewPointsError
-        Fewer pairs with a weight than half the model's parameters; or a spline's lie on a line.
+        Fewer pairs have a weight than half the model's parameters, or a spline's points are
+        collinear.
     """
     weights = np.ones(len(xy)) if weights is None else weights
     taken = weights > 0
@@ -69,7 +70,7 @@ def fit_model(
 
 
 def require_determined(kind: str, xy: FloatArray) -> None:
-    """Raise an error if places do not determine a model: least squares would still make one.
+    """Raise an error if places do not determine a model; least squares would still return one.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ def require_determined(kind: str, xy: FloatArray) -> None:
 
 
 def _is_deficient(design: FloatArray) -> bool:
-    """Return whether the columns of a matrix depend on one another."""
+    """Return whether the columns of a matrix are linearly dependent."""
     sizes = np.linalg.svd(design, compute_uv=False)
     return bool(len(sizes) < design.shape[1] or sizes[-1] <= ROUNDING * sizes[0])
 
@@ -108,13 +109,13 @@ def _solve(design: FloatArray, target: FloatArray, weights: FloatArray) -> Float
 def _fit_similarity(
     uv: FloatArray, nominal_uv: FloatArray, weights: FloatArray, *, scaled: bool
 ) -> FloatArray:
-    """Rotation, shift and, if `scaled`, scale, in closed form ([Umeyama1991]), as coefficients."""
+    """Coefficients of rotation, shift and, if `scaled`, scale, in closed form ([Umeyama1991])."""
     share = (weights / weights.sum())[:, None]
     centre, nominal_centre = (share * uv).sum(axis=0), (share * nominal_uv).sum(axis=0)
     z = (uv - centre) @ [1, 1j]
     nominal_z = (nominal_uv - nominal_centre) @ [1, 1j]
     turn = np.sum(weights * nominal_z * z.conj())
-    with np.errstate(invalid="ignore"):  # points at one place have no direction: NaN
+    with np.errstate(invalid="ignore"):  # coincident points have no direction: NaN
         turn = turn / np.sum(weights * np.abs(z) ** 2) if scaled else turn / np.abs(turn)
     linear = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
     return np.vstack([nominal_centre - centre @ linear, linear - np.eye(2)])
@@ -123,7 +124,7 @@ def _fit_similarity(
 def _fit_thin_plate(
     frame: Frame, uv: FloatArray, displacement: FloatArray, weights: FloatArray
 ) -> ThinPlateSpline:
-    """Smoothing thin-plate spline ([Wahba1990]): residuals weigh against bending."""
+    """Smoothing thin-plate spline ([Wahba1990]): residuals are traded against bending energy."""
     count = len(uv)
     affine_part = monomials(uv, 1)
     if _is_deficient(affine_part):

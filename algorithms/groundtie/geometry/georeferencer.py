@@ -1,4 +1,4 @@
-"""The QGIS Georeferencer's files of points."""
+"""Point files of the QGIS Georeferencer."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from .transform import Transform
 
 SUFFIX = ".points"
 
-# It counts pixels from the image's corner, and rows downwards from 0.
+# The Georeferencer counts pixels from the image's corner; rows are negative downwards.
 _PIXELS = Grid(Affine.scale(1, -1), None, 1, 1)
 
 
 def write_georeferencer(
     path: Path, points: TiePoints, transform: Transform, own_grid: Grid | None = None
 ) -> None:
-    """Write points for the Georeferencer, in which only used points of the fit are enabled.
+    """Write points for the Georeferencer, with only used points of the fit enabled.
 
-    `own_grid` is where it places the input, if that is not the transform's grid.
+    `own_grid` is the grid on which it places the input, if that is not the transform's grid.
     """
     source_xy = _source_grid(own_grid or transform.input_grid).pixel_to_map(points.input_px)
     residual = points.residual_px(transform)
     lines = [] if transform.crs is None else [f"#CRS: {transform.crs.to_wkt()}"]
     lines.append("mapX,mapY,sourceX,sourceY,enable,dX,dY,residual")
-    # It has no check points: it would fit to every point that is enabled.
+    # The Georeferencer has no check points: it would fit to every enabled point.
     fitted = points.fit
-    # Its rows are negative: so are its residuals along them.
+    # Its rows are negative, and so are its residuals along them.
     numbers = [points.reference_xy, source_xy, fitted, residual * [1, -1], np.hypot(*residual.T)]
     for row in np.column_stack(numbers):
         lines.append(",".join(f"{number:.17g}" for number in row))
@@ -40,7 +40,7 @@ def write_georeferencer(
 
 
 def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
-    """Read points of the Georeferencer; without a CRS line their map is in the raster's CRS.
+    """Read points of the Georeferencer; without a CRS line, their map has the input's CRS.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
         if comment.startswith("#CRS:"):
             crs = require_map(CRS.from_user_input(comment.removeprefix("#CRS:").strip()))
     rows = table_rows(lines, ("mapX", "mapY"))
-    # Older versions of QGIS called the columns so.
+    # Older versions of QGIS named the columns `pixelX` and `pixelY`.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
     input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))
     states = [USED if _is_enabled(row) else "rejected: disabled" for row in rows]
@@ -65,8 +65,8 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
 def _is_enabled(row: Row) -> bool:
     """Return whether a point takes part in the fit.
 
-    QGIS (`QgsGCPList::loadGcps`) enables points of rows that end before, and takes an empty field
-    for 0. It does so with words, too, which nobody means who writes "true".
+    QGIS (`QgsGCPList::loadGcps`) enables points of rows that end before this field, and reads an
+    empty field as 0. It reads words as 0, too, even "true", so that words are refused here.
     """
     word = row.get("enable")
     if word is None:

@@ -1,6 +1,6 @@
-"""Reading a vector layer by fiona: the part that runs in a process of its own.
+"""Reading of a vector layer with fiona, in a separate process.
 
-`vector_layers` starts this file as a script, so it imports nothing of the package.
+`vector_layers` starts this file as a script, so that it imports nothing from the package.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def layer_of(path: str) -> dict[str, Any]:
                     for feature in layer
                 ],
             }
-    # What a damaged file makes of GDAL's answers is no matter of this package: any class of error.
+    # A damaged file may raise any class of error.
     except Exception as error:
         return {"error": str(error) or type(error).__name__}
 
@@ -50,7 +50,7 @@ def _plain(geometry: Any) -> dict[str, Any] | None:
 
 
 if __name__ == "__main__":
-    # Modules beside this one must not pass for others' (Python's option -P is none of 3.10's).
+    # Modules beside this one must not shadow others (Python 3.10 lacks the option -P).
     sys.path[:] = [folder for folder in sys.path if folder != os.path.dirname(__file__)]
-    # Dates and binary attributes are of no use: as text they do no harm.
+    # Dates and binary attributes are not used; as text they do no harm.
     json.dump(layer_of(sys.argv[1]), sys.stdout, default=str)

@@ -1,4 +1,4 @@
-"""How far an image may lie from its nominal place."""
+"""Limits of the search around an image's nominal place."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """How far the input may be shifted, rotated and scaled against its nominal geotransform.
+    """Largest shift, rotation and scale of the input against its nominal geotransform.
 
     Parameters
     ----------
     radius
-        Largest shift, in the unit of the positions searched: metres on the map, pixels of windows.
+        Largest shift, in the unit of the search: metres on the map, pixels in windows.
     rotation_deg
         Largest rotation, either way.
     scale
@@ -25,5 +25,5 @@ class SearchLimits:
 
     @property
     def is_shift(self) -> bool:
-        """Whether nothing but shifts is searched for."""
+        """Whether only shifts are searched for."""
         return self.rotation_deg == 0 and self.scale == (1.0, 1.0)

@@ -1,4 +1,4 @@
-"""By how much a model misses points that took no part in its fit."""
+"""Residuals of points that took no part in a model's fit."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Misses:
     Parameters
     ----------
     px
-        Where the points lie, shape (n, 2).
+        Positions of the points, shape (n, 2).
     residuals_px
-        By how much the model misses them, shape (n, 2).
+        Residuals against the model, shape (n, 2).
     radius_px
-        Radius of the windows in which they were searched for.
+        Radius of the search windows.
     max_error_px
-        Largest root mean square error of inliers that is accepted.
+        Largest accepted root mean square error of inliers.
     tolerance_px
-        Within which a point agrees with the model.
+        Distance within which a point agrees with the model.
     """
 
     px: FloatArray
@@ -40,7 +40,7 @@ class Misses:
 
     @cached_property
     def mixture(self) -> Mixture:
-        """Inliers, normally distributed, and outliers anywhere in the windows."""
+        """Normally distributed inliers, and outliers uniformly distributed over the windows."""
         area = (2 * self.radius_px + 1) ** 2
         return fit_mixture(self.residuals_px, area, sigma_range_px(self.max_error_px))
 
@@ -51,10 +51,10 @@ class Misses:
 
     @property
     def agreeing(self) -> int:
-        """How many points agree."""
+        """Number of points that agree with the model."""
         return int((np.hypot(*self.residuals_px.T) <= self.tolerance_px).sum())
 
     def log10_chance(self, total: int) -> float:
-        """Return log10 of the probability that as many of so many random matches would agree."""
+        """Return log10 of the probability that as many of `total` random matches would agree."""
         probability = agreement_probability(self.tolerance_px, self.radius_px)
         return log10_chance(self.agreeing, total, probability)

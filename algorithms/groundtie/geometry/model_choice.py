@@ -1,7 +1,7 @@
-"""The choice of a model: the simplest that predicts points well that were left out of its fit.
+"""The choice of a model: the simplest that predicts well the points left out of its fit.
 
-Neighbouring points err together. So what is left out are blocks of them, one fold after the other,
-and what a more flexible model gains is measured against its scatter between blocks.
+The errors of neighbouring points are correlated. The cross-validation therefore leaves out blocks
+of points, and judges the gain of a more flexible model by its scatter between blocks.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ..rasters.reading import Mask
 
 T = TypeVar("T")
 
-# A more flexible model must raise the left-out scores by so many of their standard errors: by one,
-# as is usual ([Hastie2009] 7.10), but bending, which extrapolates badly, by two. Any shift
-# is better than none. Measured with `make bench`.
+# A more flexible model must raise the left-out scores by this many of their standard errors. One is
+# usual ([Hastie2009] 7.10); models that bend extrapolate badly and need two. A shift needs only
+# some gain. Measured with `make bench`.
 STANDARD_ERRORS = {
     "translation": 0.0,
     "shift_drift": 1.0,
@@ -31,13 +31,13 @@ STANDARD_ERRORS = {
     "polynomial3": 2.0,
 }
 
-# Points for each parameter below which a model is not considered: chips, of which each has a whole
-# surface; keypoint matches that agree with the model; control points, two coordinates each.
+# Fewest points for each parameter of a model: chips, each with a whole similarity surface; keypoint
+# matches that agree with the model; control points, two coordinates each.
 CHIPS_PER_PARAMETER = 2
 MATCHES_PER_PARAMETER = 3
 CONTROL_PER_PARAMETER = 1.5
 
-# As is usual ([Hastie2009] 7.10).
+# The usual number ([Hastie2009] 7.10).
 _FOLDS = 5
 
 
@@ -53,21 +53,21 @@ def choose_simplest(
     Parameters
     ----------
     kinds
-        From simple to flexible.
+        Kinds of models, from simple to flexible.
     fit
-        Fits a kind, one of `models.PARAMETERS` or of `bias.KINDS`. Returns the model, in whatever
-        form, and how well points are predicted without them: larger is better, shape (n,). Raises
-        TooFewPointsError where the points are too few for it or disagree.
+        Fits a kind, one of `models.PARAMETERS` or of `bias.KINDS`. Returns the model, in any form,
+        and the score of each point by a model fitted without it, shape (n,): larger is better.
+        Raises TooFewPointsError if the points are too few or disagree.
     px
-        Where the points lie, shape (n, 2).
+        Positions of the points, shape (n, 2).
     baseline
-        Scores without any model, shape (n,), which the first one must exceed; None: it need not.
+        Scores without any model, shape (n,), which the first model must exceed; None: no condition.
     is_held
-        Whether points hold a model that would replace a simpler one, beside its gain.
+        Whether the points support a model that would replace a simpler one, apart from its gain.
 
     Returns
     -------
-    The chosen model, and all that were fitted.
+    The chosen model, and all fitted models.
 
     Raises
     ------
@@ -103,9 +103,9 @@ def left_out_scores(
     Parameters
     ----------
     px
-        Where the points lie, shape (n, 2).
+        Positions of the points, shape (n, 2).
     models
-        One for each of `left_out_blocks`.
+        One model for each of `left_out_blocks`.
     score
         Returns the scores, shape (m,), of the m points that a mask of shape (n,) selects.
     """
@@ -116,10 +116,10 @@ def left_out_scores(
 
 
 def left_out_blocks(px: FloatArray) -> list[Mask]:
-    """Return which points each fold leaves out, shape (n,) each; all are left out once.
+    """Return masks of the points that each fold leaves out, shape (n,) each; every point once.
 
-    Neighbours share a fold; each row and each column of blocks holds every fold once. A few points
-    may all lie in blocks of one: each block is a fold then, as no model is made without all.
+    Neighbours share a fold; each row and each column of blocks holds every fold once. If all points
+    lie in blocks of one fold, each block becomes a fold: no model can be fitted to no points.
     """
     block = blocks_of(px)
     folds = (block[:, 0] + 2 * block[:, 1]) % _FOLDS
@@ -129,14 +129,16 @@ def left_out_blocks(px: FloatArray) -> list[Mask]:
 
 
 def standard_errors(rise: FloatArray, px: FloatArray) -> float:
-    """Return the sum of a rise in its standard errors; neighbours rise together, so by blocks.
+    """Return the sum of a rise in units of its standard error.
+
+    The standard error comes from the sums of blocks, since neighbouring points are correlated.
 
     Parameters
     ----------
     rise
-        By how much something is larger at each point, shape (n,).
+        Rise at each point, shape (n,).
     px
-        Where the points lie, shape (n, 2).
+        Positions of the points, shape (n, 2).
     """
     block = blocks_of(px) @ [1, _FOLDS]
     sums = np.array([rise[block == b].sum() for b in np.unique(block)])
@@ -147,7 +149,7 @@ def standard_errors(rise: FloatArray, px: FloatArray) -> float:
 def blocks_of(px: FloatArray, side: int = _FOLDS) -> NDArray[np.int_]:
     """Return the column and row of the block that each point lies in, shape (n, 2).
 
-    The points' extent is cut into so many blocks a side: mostly as many as there are folds.
+    The points' extent is divided into `side` blocks a side, by default as many as there are folds.
     """
     low, high = px.min(axis=0), px.max(axis=0)
     unit = (px - low) / np.maximum(high - low, 1e-12)

@@ -1,7 +1,8 @@
 """Models of the misregistration: maps of the plane onto itself.
 
-A model takes a position on the reference map to the place where the input's own georeferencing
-has this ground. Both are in reference map units. [Suri2010] eq 3.27–3.32, [Patel2017] eq 2.2–2.7.
+A model takes a position on the reference map to its nominal position, where the input's own
+georeferencing places this ground. Both are in reference map units. [Suri2010] eq 3.27–3.32,
+[Patel2017] eq 2.2–2.7.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ PARAMETERS = {
 # Models of the plane alone.
 KINDS = tuple(kind for kind in PARAMETERS if kind != TERRAIN)
 
-# The inverse has arrived when it misses by less, as a share of the frame; the most steps until
-# then. There is none where it still misses by so much, a hundredth of a pixel in 10 000.
+# The inverse has converged when its miss is below the precision, as a share of the frame, and does
+# not exist where the last miss is above the largest: a hundredth of a pixel in 10 000.
 _INVERSE_PRECISION, _LARGEST_MISS = 1e-12, 1e-6
 _INVERSE_STEPS = 20
 
@@ -90,14 +91,14 @@ def monomials(uv: FloatArray, degree: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Model(ABC):
-    """What all models share: a displacement that depends on the place in a frame.
+    """Base of all models: a displacement that depends on the position in a frame.
 
     Parameters
     ----------
     kind
-        One of `KINDS`.
+        One of `PARAMETERS`.
     frame
-        What the coefficients refer to.
+        Frame of the coefficients.
     """
 
     kind: str
@@ -120,11 +121,11 @@ class Model(ABC):
     def inverse(self, xy: ArrayLike) -> FloatArray:
         """Return the reference map positions, shape (n, 2), of nominal positions `xy`.
 
-        By Newton's method with a numerical Jacobian; NaN where it finds none, as beyond where a
-        polynomial folds the map.
+        Newton's method with a numerical Jacobian; NaN where it finds no inverse, as beyond a fold
+        of a polynomial.
         """
         target = self.frame.enter(xy)
-        # Start from the frame's origin: nominal positions without georeferencing are far from it.
+        # Start at the frame's origin: without georeferencing, nominal positions are far from it.
         uv = self._newton_step(np.zeros_like(target), target)
         for _ in range(_INVERSE_STEPS):
             miss = target - uv - self.displacement(uv)
@@ -135,7 +136,7 @@ class Model(ABC):
         return np.where(miss[:, None] <= _LARGEST_MISS, self.frame.leave(uv), np.nan)
 
     def on_map(self, affine: Affine) -> Self:
-        """Return this model of pixel positions as one of map positions.
+        """Return this model, which takes pixel positions, as a model of map positions.
 
         `affine` takes the pixels to the map.
         """
@@ -165,7 +166,7 @@ class PolynomialModel(Model):
     Parameters
     ----------
     coefficients
-        Of the displacement in the frame, shape (terms, 2), in the order of `monomials`.
+        Shape (terms, 2): of the displacement in the frame, in the order of `monomials`.
     """
 
     coefficients: FloatArray
@@ -206,5 +207,5 @@ def thin_plate_kernel(uv: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def shift_model(dx: float, dy: float) -> Model:
-    """Return a translation in map units, by nothing the identity, as a model."""
+    """Return a translation in map units as a model; (0, 0) is the identity."""
     return PolynomialModel("translation", Frame(Affine.identity()), np.array([[dx, dy]]))

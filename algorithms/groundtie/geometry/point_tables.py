@@ -1,4 +1,4 @@
-"""Tables of points that a file holds: rows by the names of columns, and positions in these."""
+"""Tables of points in files: rows by column name, and the positions in them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Row = dict[str, Any]
 
 REFERENCE = ("reference_x", "reference_y")
 
-# Where a row states the place in the input: on the reference map, on its own map, and its pixel.
+# Columns of a point's place in the input: on the reference map, on the input's map, as a pixel.
 NOMINAL = ("nominal_x", "nominal_y")
 INPUT = ("input_x", "input_y")
 PIXEL = ("input_col", "input_row")
@@ -22,7 +22,7 @@ PIXEL = ("input_col", "input_row")
 # Standard deviations of a match.
 SIGMA = ("sigma_x_px", "sigma_y_px")
 
-# No position on a map of the Earth, in any unit, nor in an image is farther off.
+# Larger than any coordinate on a map of the Earth, in any unit, or in an image.
 _FARTHEST = 1e10
 
 
@@ -58,7 +58,7 @@ def numbers(rows: list[Row], name: str) -> FloatArray:
 
 
 def _number(row: Row, name: str, number: int) -> float:
-    """Return the number in a column of the row of a number, from 1."""
+    """Return the number in a column of a row; `number` counts rows from 1, for messages."""
     try:
         return plain_number(row[name])
     except (TypeError, ValueError) as error:
@@ -72,24 +72,27 @@ def positions(rows: Iterable[Row], x: str, y: str) -> FloatArray:
     Raises
     ------
     KeyError, ValueError
-        A row has none.
+        A row has no position.
     """
     places = [position(row, x, y, number) for number, row in enumerate(rows, 1)]
     return np.array(places, float).reshape(-1, 2)
 
 
 def position(row: Row, x: str, y: str, number: int) -> tuple[float, float]:
-    """Return the position in two columns of the row of a number, from 1; raises as `positions`."""
+    """Return the position in two columns of a row, which is `number`, from 1, in messages.
+
+    Raises as `positions`.
+    """
     return _number(row, x, number), _number(row, y, number)
 
 
 def require_places(places: FloatArray) -> FloatArray:
-    """Return positions, shape (n, 2), that a file holds.
+    """Return positions from a file, shape (n, 2), unchanged.
 
     Raises
     ------
     ValueError
-        One is so far off that it lies on no map, or is not finite.
+        A position is not finite, or too far off to lie on any map.
     """
     lost = int((~(np.abs(places) < _FARTHEST)).any(axis=1).sum())
     if lost:

@@ -1,4 +1,4 @@
-"""Views that products state in metadata of their own, which lie beside the image.
+"""Views from products' own metadata files beside the image.
 
 Sentinel-1 (annotation), TerraSAR-X and ICEYE (XML), Capella (extended JSON), Umbra (metadata JSON),
 and the XML and IMD files of Maxar. Azimuths are those of the sensor, or of the sun, seen from the
@@ -20,17 +20,17 @@ from ..strict_json import read_json
 
 RADAR, CAMERA = "radar", "camera"
 
-# Of each sensor, what is known of it by name.
+# The sensor, and its angles by name.
 Stated = tuple[str, Mapping[str, float]]
 
 _IMD = re.compile(r"\b(mean(?:Sat|Sun)(?:Az|El))\s*=\s*(-?\d[\d.eE+-]*)", re.IGNORECASE)
 
-# A larger file is none of metadata.
+# A larger file does not hold metadata.
 _LARGEST_BYTES = 100_000_000
 
 
 def metadata_beside(image: Path) -> Iterator[Path]:
-    """Yield the files beside an image that a product's metadata may be, by the products' names."""
+    """Yield the files beside an image that may hold metadata, by the products' naming schemes."""
     folder, stem = image.parent, image.stem
     yield folder / f"{stem}_extended.json"  # Capella
     yield folder / f"{re.sub('_(GEC|SICD|MM)$', '', stem)}_METADATA.json"  # Umbra
@@ -41,14 +41,14 @@ def metadata_beside(image: Path) -> Iterator[Path]:
 
 
 def read_product_view(path: Path) -> Stated | None:
-    """Return the sensor and the angles that a product's metadata state, by name; None: none.
+    """Return the sensor and angles, by name, from a product's metadata; None if it has no view.
 
     Raises
     ------
     OSError
         The file cannot be read.
     ValueError
-        It is damaged, or lacks what such metadata state.
+        The file is damaged, or lacks a required value.
     """
     if path.stat().st_size > _LARGEST_BYTES:
         raise ValueError("it is too large")
@@ -106,7 +106,7 @@ def _of_imd(text: str) -> Stated:
 
 
 def _umbra(collect: Mapping[str, Any]) -> Stated:
-    """Return the view of a collect, whose azimuth is that of the satellite from the ground."""
+    """Return the view of a collect, whose azimuth already is from the ground to the satellite."""
     return RADAR, {
         "azimuth": float(collect["angleAzimuthDegrees"]) % 360,
         "incidence": float(collect["angleIncidenceDegrees"]),
@@ -114,7 +114,7 @@ def _umbra(collect: Mapping[str, Any]) -> Stated:
 
 
 def _capella(collect: Mapping[str, Any]) -> Stated:
-    """Return the view of a collect: from its centre to the middle of the satellite's states."""
+    """Return the view of a collect, from its centre to the middle one of the state vectors."""
     centre = collect["image"]["center_pixel"]
     states = collect["state"]["state_vectors"]
     azimuth = _azimuth_deg(centre["target_position"], states[len(states) // 2]["position"])
@@ -122,10 +122,10 @@ def _capella(collect: Mapping[str, Any]) -> Stated:
 
 
 def _azimuth_deg(ground: Any, sensor: Any) -> float:
-    """Return the azimuth of one geocentric position, seen from another one on the ground."""
+    """Return the azimuth of a sensor seen from the ground, both in geocentric coordinates."""
     x, y, z = (float(value) for value in ground)
     east = np.array([-y, x, 0.0]) / np.hypot(x, y)
-    # On the ground the normal of the ellipsoid has this latitude.
+    # Geodetic latitude, that of the ellipsoid's normal, exact on the ellipsoid.
     latitude = np.arctan2(z, (1 - FLATTENING) ** 2 * np.hypot(x, y))
     longitude = np.arctan2(y, x)
     north = np.array(
@@ -140,7 +140,7 @@ def _azimuth_deg(ground: Any, sensor: Any) -> float:
 
 
 def _from_track(heading_deg: float, side: str, incidence_deg: float) -> dict[str, float]:
-    """Return the view of a radar that looks to one side of its track, at right angles."""
+    """Return the view of a radar that looks to one side, at right angles to its track."""
     if side.lower() not in ("left", "right"):
         raise ValueError(f"a radar does not look to the {side!r}")
     look = heading_deg + (90.0 if side.lower() == "right" else -90.0)
@@ -169,7 +169,7 @@ def _number(root: ElementTree.Element, path: str) -> float:
 
 _MEANS = ("MEANSATAZ", "MEANSATEL", "MEANSUNAZ", "MEANSUNEL")
 
-# By an element that only such metadata have.
+# Readers by an element that only the metadata of that product contain.
 _XML: Mapping[str, Callable[[ElementTree.Element], Stated]] = {
     ".//platformHeading": _sentinel_1,
     ".//productInfo/sceneInfo/headingAngle": _terrasar_x,

@@ -1,6 +1,6 @@
 """Robust fits: consensus among many outliers, then a mixture of inliers and outliers.
 
-Positions are pixel positions of the matching grid here, so that distances are in pixels.
+Positions here are pixel positions of the matching grid, so that distances are in pixels.
 """
 
 from __future__ import annotations
@@ -14,45 +14,47 @@ from ..rasters.grid import FloatArray
 from .fitting import fit_model
 from .models import DEGREE, Frame, Model, PolynomialModel, fewest_points, monomials
 
-# Where a fifth of the pairs is right, so many samples of three hold a right one with 99 %.
+# If a fifth of the pairs are correct, this many samples of three include an all-correct one with a
+# probability of 99 %.
 _SAMPLES = 600
 
-# Pairs times samples that are looked at together, 16 MB of residuals: large scenes have 50 000
-# pairs of features.
+# Pairs times samples evaluated together, 16 MB of residuals: large scenes have 50 000 pairs of
+# features.
 _TOGETHER = 1_000_000
 
-# Pairs agree with a first model of degree 1 within this, in pixels; what bends further is left to
-# the fit that starts from it.
+# Tolerance for agreement with a first model of degree 1, in pixels; larger bending is left to the
+# fit that starts from this model.
 CONSENSUS_PX = 3.0
 
-# After so many steps a mixture changes no more: between 10 and 300 points by less than 1e-13.
+# The mixture has converged after this many steps: with 10 to 300 points it changes by less than
+# 1e-13.
 _MIXTURE_STEPS = 40
 
-# Fits and mixtures take turns until the model moves no point any more, at most so often.
+# Fits and mixtures alternate until the model no longer moves any point, at most this many times.
 _FIT_STEPS = 15
 
-# Standard deviation that inliers may have, in pixels.
+# Allowed standard deviation of inliers, in pixels.
 _SIGMA_RANGE_PX = (0.2, 2.5)
 
-# Share that inliers may have: with none, or with all, nothing would change any more.
+# Allowed share of inliers: expectation maximisation cannot leave a share of 0 or 1.
 _SHARE_RANGE = (0.02, 0.98)
 
-# Inliers are first thought to scatter by this, in pixels; starting wide would take a second cluster
-# of outliers, as layover makes, for the tail of the inliers.
+# Initial standard deviation of inliers, in pixels. A wide start would take a second cluster, such
+# as outliers by layover, for the tail of the inliers.
 _FIRST_SIGMA = 1.0
 
-# A linear part this far from the identity is no misregistration of georeferenced images.
+# A linear part this far from the identity is not a misregistration of georeferenced images.
 _LARGEST_DISTORTION = 0.25
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """Residuals seen as a mixture of inliers and of outliers, which fell anywhere.
+    """Residuals as a mixture of inliers and uniformly distributed outliers.
 
     Parameters
     ----------
     probability
-        Of each match to be an inlier, shape (n,).
+        Probability of each match to be an inlier, shape (n,).
     sigma
         Standard deviation of inliers along each axis, in the residuals' unit.
     """
@@ -73,7 +75,7 @@ def fit_mixture(
 ) -> Mixture:
     """Separate inliers from outliers by expectation maximisation.
 
-    Inliers scatter around zero with a circular normal distribution, outliers fall evenly over
+    Inliers have a circular normal distribution around zero; outliers are distributed uniformly over
     their search window.
 
     Parameters
@@ -111,11 +113,11 @@ def densities(
     squared
         Squared lengths of residuals, shape (n,).
     variance
-        Of inliers along an axis.
+        Variance of inliers along an axis.
     share
-        Of inliers; neither all nor none are believed to be.
+        Share of inliers; it is kept away from 0 and 1.
     window_area
-        Area that outliers fall on.
+        Area over which outliers are distributed.
     """
     share = float(np.clip(share, *_SHARE_RANGE))
     inlier = share * np.exp(-squared / (2 * variance)) / (2 * np.pi * variance)
@@ -139,11 +141,11 @@ def find_consensus(
     tolerance
         Distance within which a pair agrees, in pixels.
     kind
-        One of `models.PARAMETERS`; of those that are more flexible, "affine" is fitted.
+        One of `models.PARAMETERS`; for more flexible kinds, "affine" is fitted.
     seed
-        Of the random samples.
+        Seed of the random samples.
     largest_distortion
-        How far any coefficient of the linear part may be from the identity's.
+        Largest deviation of any coefficient of the linear part from the identity's.
     """
     kind = kind if DEGREE.get(kind, 2) <= 1 else "affine"
     frame = Frame.around(xy)
@@ -169,7 +171,7 @@ def find_consensus(
 
 
 def distances(model: Model, xy: FloatArray, nominal_xy: FloatArray) -> FloatArray:
-    """Return the distances between nominal positions and the model's, shape (n,), pixels."""
+    """Return the distances of nominal from predicted positions, shape (n,), pixels."""
     return np.asarray(np.hypot(*(nominal_xy - model(xy)).T))
 
 
@@ -181,10 +183,10 @@ def fit_robustly(
     start: Model,
     window_area: float,
 ) -> tuple[Model, Mixture]:
-    """Fit a model to pairs of which many may be outliers.
+    """Fit a model to pairs, many of which may be outliers.
 
-    Fits and mixtures (see `fit_mixture`) take turns; each pair's weight is its probability to be
-    an inlier over its variance.
+    Fits and mixtures (see `fit_mixture`) alternate; each pair's weight is its probability to be an
+    inlier, divided by its variance.
 
     Parameters
     ----------
@@ -193,8 +195,8 @@ def fit_robustly(
     xy, nominal_xy
         Pairs of positions, shape (n, 2), pixels.
     variances
-        Variance of each match along an axis, shape (n,), or of all, px²; the mixture's own variance
-        is added, so that no match has much more weight than its model is exact.
+        Variance of each match along an axis, shape (n,), or of all, px². The variance of the
+        mixture is added, so that no match gets more weight than the fit of the model justifies.
     start
         Model to start from, usually `find_consensus`.
     window_area
@@ -217,7 +219,7 @@ def fit_robustly(
 
 
 def _parts(samples: int, pairs: int) -> list[slice]:
-    """Return which samples are looked at together."""
+    """Return the slices of samples that are evaluated together."""
     step = max(_TOGETHER // pairs, 1)
     return [slice(first, min(first + step, samples)) for first in range(0, samples, step)]
 
@@ -229,7 +231,7 @@ def _sampled_models(
     size = fewest_points(kind)
     picks = np.empty((_SAMPLES, size), np.intp)
     for some in _parts(_SAMPLES, len(uv)):
-        # Numbers are drawn row by row: the same, however many together.
+        # Drawn row by row, the numbers do not depend on the size of the slices.
         drawn = random.random((some.stop - some.start, len(uv)))
         picks[some] = drawn.argpartition(size - 1, axis=1)[:, :size]
     if size == 1:
@@ -252,7 +254,7 @@ def _sampled_models(
         well_posed = np.abs(np.linalg.det(design)) > 0.05
         design[~well_posed] = np.eye(3)
         coefficients = np.asarray(np.linalg.solve(design, displacement[picks]), np.float64)
-        # Three places on a line determine a shift only.
+        # Three collinear places determine a shift only.
         coefficients[~well_posed] = 0.0
         coefficients[~well_posed, 0] = displacement[picks[~well_posed, 0]]
     return coefficients

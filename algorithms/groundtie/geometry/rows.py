@@ -1,4 +1,4 @@
-"""Tables of arrays, a row for each of something: tie points, keypoints, matches."""
+"""Tables of arrays with one row for each tie point, keypoint or match."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Rows:
 
     @classmethod
     def concatenate(cls, tables: Sequence[Self]) -> Self:
-        """Return the rows of all tables, one after the other; all else is the first one's."""
+        """Return the rows of all tables in order; all other fields are those of the first table."""
         first = tables[0]
         names = first._columns
         return replace(

@@ -1,7 +1,7 @@
-"""What an orthoimage is displaced by: the ground's height over that which it was made with.
+"""Terrain heights behind an orthoimage's relief displacement: true and assumed ones.
 
-A sensor sees a place along a line. An orthoimage shows the place where this line meets the heights
-that it was made with, so that the error of these displaces it along the line.
+Orthorectification puts each pixel where its line of sight meets the assumed heights. An error of
+the assumed heights therefore displaces the pixel along the line of sight.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from ..rasters.height_surfaces import RasterSurface, surface_around
 from ..rasters.reading import open_raster
 from .models import FloatArray
 
-# Places a side at which heights must be known.
+# Heights must be known on a square lattice with this many points a side.
 _ASKED = 33
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights of the ground, and those that an orthoimage was made with.
+    """Heights of the ground, and the heights that an orthoimage was made with.
 
     Parameters
     ----------
     ground
         Heights of the ground at map positions.
     assumed
-        Those that the orthoimage was made with; None: one height everywhere.
+        Heights that the orthoimage was made with; None: one height everywhere.
     region
-        Least x and y of the map that are asked for, and the largest: within, voids are filled, and
-        the outermost heights hold beyond the rasters.
+        Smallest x and y, then largest x and y, of the map area in question. Within it, voids are
+        filled and the outermost heights are extended beyond the rasters.
     plane
-        Takes the positions that are asked for, of a map or of a grid's pixels, to the map.
+        Takes query positions, on a map or in a grid's pixels, to the map.
     """
 
     ground: RasterSurface
@@ -65,7 +65,7 @@ class Terrain:
         Parameters
         ----------
         dem, input_dem
-            The rasters, of any CRS; what `open_raster` takes.
+            The rasters, in any CRS, as `open_raster` takes them.
         crs
             CRS of the map.
         region
@@ -74,13 +74,13 @@ class Terrain:
         Raises
         ------
         GeoreferencingError, NoOverlapError, RasterContentError
-            One of them cannot be located, lies elsewhere or holds no value there.
+            A raster has no location, lies elsewhere or holds no value in the region.
         """
         assumed = None if input_dem is None else _surface(input_dem, crs, region)
         return cls(_surface(dem, crs, region), assumed, region)
 
     def seen_from(self, affine: Affine) -> Terrain:
-        """Return this terrain for pixel positions that `affine` takes to what was asked."""
+        """Return this terrain for pixel positions, which `affine` takes to its query positions."""
         return replace(self, plane=compose(self.plane, affine))
 
     def ground_m(self, xy: FloatArray) -> FloatArray:
@@ -94,12 +94,12 @@ class Terrain:
         return self.assumed.at(apply_affine(self.plane, xy))
 
     def require_cover(self, grid: Grid, within: Grid, crs: CRS | None) -> None:
-        """Refuse terrain models that do not cover where a grid and another one meet.
+        """Refuse terrain models that do not cover the overlap of two grids.
 
         Raises
         ------
         NoOverlapError
-            Heights are unknown at a part of it.
+            A terrain model does not reach a part of the overlap.
         """
         xy = grid.pixel_to_map(grid.places(_ASKED))
         xy = xy[within.covers(within.to_own_map(xy, crs))]
@@ -127,7 +127,7 @@ class Terrain:
 def _surface(
     raster: Any, crs: CRS | None, region: tuple[float, float, float, float]
 ) -> RasterSurface:
-    # Not closed: whoever has the transform may ask for heights at any time.
+    # Not closed: the transform may be evaluated, and heights needed, at any time.
     source = open_raster(raster)
     grid = source.grid
     require_both_or_none(grid.crs, crs, f"{source.path} and the reference")

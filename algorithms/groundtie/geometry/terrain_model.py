@@ -1,4 +1,4 @@
-"""A model with a height term: an affine displacement, and one along the line of sight."""
+"""A model with a height term: affine displacement plus relief displacement."""
 
 from __future__ import annotations
 
@@ -18,34 +18,35 @@ from ..rasters.grid import mesh
 from .models import TERRAIN, FloatArray, Frame, Model, PolynomialModel
 from .terrain import Terrain
 
-# Heights are found along the line of sight to this, in metres: far below what displaces a pixel.
+# Heights are found along the line of sight to this precision, in metres: far below the height that
+# displaces by a pixel.
 _PRECISION_M = 0.01
 
-# The most steps until then; on a ridge that is steeper than any, 15 do not suffice (test_terrain).
+# Largest number of steps. On a ridge steeper than any real one, 15 do not suffice (test_terrain).
 _STEPS = 30
 
-# Where a line of sight meets the ground at less than this slope between both, per metre, it meets
-# it more than once nearby (layover): there no step by the slope leads near.
+# Below this slope, per metre, between line of sight and ground, the line meets the ground more than
+# once nearby (layover), and a secant step does not approach a solution.
 LEAST_SLOPE = 0.2
 
-# Places a side at which heights are compared with those that a stored transform was made with, in
-# metres.
+# A stored transform's heights are compared with the terrain models at this many places a side, to
+# this tolerance in metres.
 _COMPARED, _SAME_M = 3, 0.05
 
 
 @dataclass(frozen=True)
 class TerrainModel(Model):
-    """An affine displacement, and one along the line of sight in proportion to a height error.
+    """An affine displacement, plus one along the line of sight proportional to a height error.
 
     Parameters
     ----------
     coefficients
-        Shape (4, 2): of the displacement in the frame, in the order of `monomials`, and the
+        Shape (4, 2): the affine displacement in the frame, in the order of `monomials`, and the
         displacement for each metre of height.
     terrain
-        Where heights come from, for positions where the frame leads to.
+        Source of the heights, for the positions that the frame leads to.
     origin_m
-        The height error that is not counted: the affine part has it.
+        Height error that the affine part already contains; it is subtracted.
     """
 
     coefficients: FloatArray
@@ -63,7 +64,7 @@ class TerrainModel(Model):
         return self.affine.displacement(uv) + along_sight
 
     def rise_m(self, uv: FloatArray) -> FloatArray:
-        """Return the ground's height, (n,), over that which was assumed where it is shown."""
+        """Return the ground's height, (n,), above the assumed height where the image shows it."""
         terrain, leave = self.terrain, self.frame.leave
         ground = terrain.ground_m(leave(uv)) - self.origin_m
         if terrain.assumed is None:
@@ -78,7 +79,7 @@ class TerrainModel(Model):
     def inverse(self, xy: ArrayLike) -> FloatArray:
         """Return the reference map positions, shape (n, 2), of nominal positions `xy`.
 
-        Along the line of sight that ends there.
+        They lie where the line of sight to the nominal position meets the ground.
         """
         terrain, leave = self.terrain, self.frame.leave
         uv, along = self.frame.enter(xy), self.coefficients[3]
@@ -92,7 +93,7 @@ class TerrainModel(Model):
         return seen(_settled(lambda rise: terrain.ground_m(seen(rise)) - assumed, len(uv)))
 
     def on_map(self, affine: Affine) -> TerrainModel:
-        """Return this model of pixel positions as one of map positions."""
+        """Return this model, which takes pixel positions, as a model of map positions."""
         return replace(super().on_map(affine), terrain=self.terrain.seen_from(~affine))
 
     def to_json(self) -> dict[str, Any]:
@@ -113,20 +114,20 @@ class TerrainModel(Model):
         Parameters
         ----------
         values
-            What `to_json` returned.
+            Result of `to_json`.
         frame
-            What the coefficients refer to.
+            Frame of the coefficients.
         crs
             CRS of the map.
         folder
-            Where terrain models are looked for that are not where they were.
+            Folder to search for terrain models that are no longer at their stored path.
 
         Raises
         ------
         KeyError, TypeError, ValueError
-            The values describe none.
+            The values do not describe a model.
         TransformFileError
-            A terrain model is not there, or another one.
+            A terrain model is missing, or its heights differ from the stored ones.
         """
         stored_paths = values["dem"], values["input_dem"]
         paths = [None if path is None else str(path) for path in stored_paths]
@@ -150,7 +151,7 @@ class TerrainModel(Model):
         return model
 
     def _compared_m(self) -> FloatArray:
-        """Return both heights at places of the frame, shape (n, 2)."""
+        """Return ground and assumed heights at places of the frame, shape (n, 2)."""
         side = np.linspace(-0.5, 0.5, _COMPARED)
         places = self.frame.leave(mesh(side, side))
         terrain = self.terrain
@@ -158,10 +159,10 @@ class TerrainModel(Model):
 
 
 def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray:
-    """Return what a function of a height, shapes (size,), returns unchanged.
+    """Return the fixed points, shape (size,), of a function of heights, shape (size,).
 
-    By secants, kept between a height that is too low and one that is too high once both are known:
-    a continuous function has what is sought between them, wherever else it has it.
+    Secant steps, kept within a bracket once one height is known to be too low and one too high: a
+    continuous function has a fixed point between them, even if it has others elsewhere.
     """
     before = np.zeros(size)
     rise = risen(before)
@@ -175,7 +176,7 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = (still - missed) / (rise - before)
             step = -still / slope
-        # In layover: on towards the other side, twice as far each time.
+        # In layover: onward to the other side of the fixed point, twice as far each time.
         onward = -np.sign(still) * 2 * np.abs(rise - before)
         step = np.where(slope > LEAST_SLOPE, step, onward)
         before, missed = rise, still
@@ -186,9 +187,9 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
 
 
 def _found(path: str, folder: Path | None) -> Path:
-    """Return a terrain model's file, or the one of its name in a folder if it is gone."""
+    """Return a terrain model's file or, if it is gone, the file of that name in a folder."""
     beside = Path() if folder is None else folder
-    # No other names that GDAL knows: whoever wrote the transform could have anything opened.
+    # Plain files only: with GDAL's other names, a transform's author could have anything opened.
     for file in (beside / path, beside / Path(path).name):
         if file.is_file():
             return file

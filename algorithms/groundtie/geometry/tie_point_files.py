@@ -1,4 +1,4 @@
-"""Tie points in files: GeoPackage, GeoJSON, CSV and the QGIS Georeferencer's .points."""
+"""Tie-point files: GeoPackage, GeoJSON, CSV and the QGIS Georeferencer's .points."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ _ROLES = ("fit", "check", "")
 def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform: Transform) -> None:
     """Write tie points in the format of the suffix of `path`.
 
-    `.gpkg` and `.geojson` hold lines from the nominal position of a point in the input to its
-    position on the reference, in the reference's CRS and in longitude and latitude; `.csv` holds
-    the attributes alone; `.points` is for the QGIS Georeferencer, with rejected points disabled
-    and without further columns.
+    `.gpkg` and `.geojson` hold a line for each point, from its nominal position to its position on
+    the reference: in the reference's CRS and in longitude and latitude, respectively. `.csv` holds
+    the attributes alone. `.points` is for the QGIS Georeferencer, without further columns and with
+    only used points of the fit enabled.
 
     Parameters
     ----------
@@ -64,12 +64,12 @@ def write_tie_points(path: str | os.PathLike[str], points: TiePoints, transform:
     points
         The points.
     transform
-        What their residuals refer to, with the CRS of the map and the input's grid.
+        Transform that the residuals refer to, with the CRS of the map and the input's grid.
 
     Raises
     ------
     OutputError
-        The file cannot be written, or its suffix is not known.
+        The file cannot be written, or its suffix is unknown.
     """
     path = Path(path)
     suffix = _suffix(path, "written as", OutputError)
@@ -94,17 +94,17 @@ def read_tie_points(
     more: Sequence[str] = (),
     table_crs: CRS | None = None,
 ) -> TiePoints:
-    """Read tie points that `write_tie_points`, or a person with QGIS, wrote.
+    """Read tie points written by `write_tie_points` or by a person with QGIS.
 
     Parameters
     ----------
     path
-        A `.gpkg`, `.geojson`, `.csv` or `.points` file. Tables need the columns `reference_x`,
-        `reference_y`, and one pair of `nominal_x`, `nominal_y` on the reference map, `input_x`,
-        `input_y` on the input's own map, or `input_col`, `input_row`.
+        A `.gpkg`, `.geojson`, `.csv` or `.points` file. Tables need the columns `reference_x` and
+        `reference_y`, and one of the pairs `nominal_x`, `nominal_y` (on the reference map),
+        `input_x`, `input_y` (on the input's own map) or `input_col`, `input_row`.
     input_grid
-        Grid of the input. Georeferenced inputs find their pixels by the nominal positions, so
-        that any raster of the scene can be given; others find them by column and row.
+        Grid of the input. For a georeferenced input, pixels follow from the nominal positions, so
+        that any raster of the scene will do; otherwise from column and row.
     more
         Further columns of numbers to read; NaN where the file has none.
     table_crs
@@ -113,9 +113,9 @@ def read_tie_points(
     Returns
     -------
     TiePoints
-        With the CRS of their map; numbers that the file lacks are NaN. The column `edited` of
-        `more` is 1 where a line of a layer was moved or drawn by a person: its ends count then,
-        and not the columns. It stays 1 for points that are marked so in the file.
+        The points with the CRS of their map; numbers that the file lacks are NaN. The column
+        `edited` of `more` is 1 if a person moved or drew the point's line: then the line's ends
+        count instead of the columns. It stays 1 for points marked as edited in the file.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def _rows(points: TiePoints, transform: Transform) -> list[Row]:
 
 
 def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict[str, Any]]:
-    """Return rows as GeoJSON's features: lines from nominal to reference positions in a CRS."""
+    """Return rows as GeoJSON features: lines from nominal to reference positions in a CRS."""
     ends = [positions(rows, *names) for names in (NOMINAL, REFERENCE)]
     lines = np.stack([reproject(end, crs, target) for end in ends], axis=1)
     return [
@@ -181,7 +181,7 @@ def _write_gpkg(path: Path, rows: list[Row], names: Sequence[str], crs: CRS | No
 
 
 def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | None]:
-    """Return the rows of a file, the ends of their lines, and the CRS of these."""
+    """Return the rows of a file, the ends of their lines, and the CRS of the lines."""
     if suffix == ".gpkg":
         layer = read_vector_layer(path)
         rows = [feature["properties"] for feature in layer.features]
@@ -203,8 +203,8 @@ def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | No
 def _map_crs(rows: list[Row], usual: CRS | None, empty_is_none: bool) -> CRS | None:
     """Return the CRS of a table's map positions.
 
-    It is the one that the column `reference_crs` names, and the usual one where this is empty or
-    missing; but GeoJSON and CSV that we wrote of images without a CRS have an empty text.
+    The column `reference_crs` names it; if the column is empty or missing, it is the usual CRS.
+    However, GroundTie writes an empty text to GeoJSON and CSV for images without a CRS.
     """
     named = {str(row["reference_crs"]) for row in rows if row.get("reference_crs")}
     if len(named) > 1:
@@ -250,7 +250,7 @@ def _role(row: Row) -> str:
 
 
 def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
-    """Return where the points of a table are in the input (col, row), shape (n, 2)."""
+    """Return the input pixels (col, row) of the points of a table, shape (n, 2)."""
     names = set().union(*rows)
     px = np.full((len(rows), 2), np.nan)
     if input_grid.is_georeferenced and NOMINAL[0] in names:

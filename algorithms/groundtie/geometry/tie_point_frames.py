@@ -1,4 +1,4 @@
-"""Tie points as columns: arrays by their names, or a GeoDataFrame."""
+"""Tie points as columns: arrays by name, or a GeoDataFrame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .point_tables import NOMINAL, PIXEL, REFERENCE, SIGMA
 from .tie_points import TiePoints
 from .transform import Transform
 
-# What is a number, in the order of the columns; what is text comes after.
+# Columns of numbers, in their order; columns of text follow.
 NUMBERS = (
     *REFERENCE,
     *NOMINAL,
@@ -34,7 +34,7 @@ def tie_point_columns(points: TiePoints, transform: Transform) -> dict[str, NDAr
     points
         The points.
     transform
-        What their residuals refer to, with the CRS of the map and the input's grid.
+        Transform that the residuals refer to, with the CRS of the map and the input's grid.
     """
     residual = points.residual_px(transform)
     sigma = np.sqrt(points.covariance_px2[:, [0, 1], [0, 1]])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 USED = "used"
 
-# The further column that is 1 for points that a person moved or drew.
+# Further column, 1 for points that a person moved or drew.
 EDITED = "edited"
 
 NONE_HELD_OUT = (
@@ -38,21 +38,21 @@ class TiePoints(Rows):
     input_px
         Position in the input image (col, row), pixel centres at integers, shape (n, 2).
     score
-        Height of the similarity's peak in robust standard deviations of its surface, shape (n,).
+        Height of the similarity surface's peak in robust standard deviations of it, shape (n,).
     covariance_px2
         Covariance of the match (x along columns, y along rows) in matching pixels², (n, 2, 2).
     forward_backward_error_px
-        Distance between the match and its match back, in matching pixels, shape (n,).
+        Distance between the point and its match back, in matching pixels, shape (n,).
     is_check
-        True for points that are held out of every fit, shape (n,).
+        True for check points, which are held out of every fit, shape (n,).
     state
         "used" or "rejected: …" with the reason, shape (n,).
     crs
-        CRS of the reference map; None: that of the transform at hand, or none at all.
+        CRS of the reference map; None: that of the transform at hand, or no CRS at all.
     more
-        Further columns of numbers, shape (n,) each, by their names.
+        Further columns of numbers, shape (n,) each, by name.
     states_fit
-        Whether the file that they were read from states of any point that it is of the fit.
+        Whether the file that the points were read from gives any point the role fit.
     """
 
     reference_xy: FloatArray
@@ -78,14 +78,14 @@ class TiePoints(Rows):
 
     @property
     def check(self) -> NDArray[np.bool_]:
-        """Which points, held out of every fit, are measured, shape (n,)."""
+        """Which points are check points that are not rejected, shape (n,)."""
         return self.used & self.is_check
 
     @property
     def independent(self) -> NDArray[np.bool_]:
-        """Which points can measure a transform that may have been fitted to others, shape (n,).
+        """Which points can serve as check points of a transform fitted to others, shape (n,).
 
-        Those of the role check; all that are used, if roles are not stated.
+        Points with the role check, or all used points if the file states no roles.
         """
         return self.check if self.states_fit or self.check.any() else self.used
 
@@ -97,31 +97,31 @@ class TiePoints(Rows):
     def nominal_xy(self, transform: Transform) -> FloatArray:
         """Return the nominal positions on the reference map, shape (n, 2), by a transform's input.
 
-        Across the antimeridian, longitudes go on as those of the points do.
+        Across the antimeridian, longitudes continue those of the points.
         """
         nominal = transform.nominal_xy(self.input_px)
         return near_longitude(nominal, self.reference_xy[:, :1], transform.crs)
 
     def residual_px(self, transform: Transform) -> FloatArray:
-        """Return `input_px` minus where `transform` puts the points, in input pixels, (n, 2)."""
+        """Return `input_px` minus the positions by `transform`, in input pixels, (n, 2)."""
         return np.asarray(self.input_px - transform(self.reference_xy))
 
     def residual_on(self, grid: Grid, transform: Transform) -> FloatArray:
         """Return nominal minus predicted positions in pixels of a grid of the reference, (n, 2).
 
-        Pixels as chips have them, in which the input is scaled and rotated onto the reference.
+        The pixels are those of chips, in which the input is scaled and rotated onto the reference.
         """
         nominal = grid.map_to_pixel(self.nominal_xy(transform))
         missed = nominal - grid.map_to_pixel(transform.model(self.reference_xy))
         return np.asarray(missed @ transform.onto_reference(grid))
 
     def exchanged(self, reference_grid: Grid, input_grid: Grid) -> TiePoints:
-        """Return the points, found with the roles of the images exchanged, in their own roles.
+        """Return points that were found with the images' roles exchanged, in the original roles.
 
         Parameters
         ----------
         reference_grid, input_grid
-            The georeferencing of the images, in their own roles.
+            The georeferencing of the images, in their original roles.
         """
         return replace(
             self,
@@ -130,7 +130,7 @@ class TiePoints(Rows):
         )
 
     def reject(self, which: NDArray[np.bool_], reason: str) -> Self:
-        """Return the table with the points `which`, if they were used, rejected for a reason."""
+        """Return the table with the used points among `which` rejected for a reason."""
         state = self.state.astype(object)
         state[which & self.used] = f"rejected: {reason}"
         return replace(self, state=state.astype(str))
@@ -148,7 +148,7 @@ class TiePoints(Rows):
         crs: CRS | None,
         states: Sequence[str] | None = None,
     ) -> TiePoints:
-        """Return points of a fit whose places and states (None: used) are all that is known."""
+        """Return points of the fit of which only positions and states (None: used) are known."""
         count = len(reference_xy)
         unknown = np.full(count, np.nan)
         return cls(
@@ -169,7 +169,7 @@ class TiePoints(Rows):
 
     @classmethod
     def concatenate(cls, tables: Sequence[TiePoints]) -> TiePoints:
-        """Return the rows of all tables, which have one map and the same further columns."""
+        """Return the rows of all tables, which share one map and the same further columns."""
         names = tables[0].more
         more = {name: np.concatenate([t.more[name] for t in tables]) for name in names}
         return replace(super().concatenate(tables), more=more)

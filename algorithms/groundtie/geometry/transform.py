@@ -38,11 +38,11 @@ FORMAT = "groundtie-transform/1"
 class Transform:
     """Reference map position ↔ input pixel position, for any number of positions at a time.
 
-    Positions are arrays of shape (..., 2), x before y and column before row, or what numpy makes
-    one of; so is what comes back. One position alone is of shape (2,).
+    Positions are array-likes of shape (..., 2), x before y and column before row; results are
+    arrays of the same shape. A single position has the shape (2,).
 
-    The model takes a reference map position to its nominal one, where the input's georeferencing
-    places this ground; that georeferencing takes the nominal position to a pixel.
+    The model takes a reference map position to its nominal position, where the input's
+    georeferencing places this ground. That georeferencing takes the nominal position to a pixel.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Transform:
 
     @classmethod
     def nominal(cls, crs: CRS | None, input_grid: Grid) -> Transform:
-        """Return the transform that takes the input's georeferencing as it is."""
+        """Return the transform by the input's own georeferencing, unchanged."""
         return cls(shift_model(0.0, 0.0), crs, input_grid)
 
     def __call__(self, xy: ArrayLike) -> FloatArray:
@@ -69,7 +69,7 @@ class Transform:
         Raises
         ------
         ParameterError
-            They are of another shape.
+            The positions have another shape.
         """
         positions = as_positions(xy)
         moved = self.model(self._at_model(positions.reshape(-1, 2)))
@@ -86,17 +86,18 @@ class Transform:
         Raises
         ------
         ParameterError
-            They are of another shape.
+            The positions have another shape.
         """
         positions = as_positions(px)
         xy = self.input_grid.pixel_to_map(positions.reshape(-1, 2))
         return reproject(xy, self.input_grid.crs, self.crs).reshape(positions.shape)
 
     def onto_reference(self, grid: Grid) -> FloatArray:
-        """Return the matrix, (2, 2), to multiply differences of nominal pixels, (n, 2), by.
+        """Return the matrix, (2, 2), from nominal to reference pixels of a grid.
 
-        So they are in a grid's pixels on the reference, which the transform may scale and rotate:
-        as from one side of the grid to the other, along columns and rows; without heights.
+        Differences of nominal pixels, (n, 2), times the matrix are in the grid's pixels on the
+        reference; the transform may scale and rotate between them. The matrix is the mean over the
+        grid, from side to side along columns and rows, and ignores heights.
         """
         model = self.model.affine if isinstance(self.model, TerrainModel) else self.model
         size = np.array(grid.size, float)
@@ -110,22 +111,22 @@ class Transform:
         Raises
         ------
         ParameterError
-            They are of another shape.
+            The positions have another shape.
         """
         nominal = self.nominal_xy(px)
         at_model = self._at_model(nominal.reshape(-1, 2))
         return self.model.inverse(at_model).reshape(nominal.shape)
 
     def _at_model(self, xy: FloatArray) -> FloatArray:
-        """Return positions of the reference map, (n, 2), with longitudes as the model has them."""
+        """Return reference map positions, (n, 2), with longitudes near those of the model."""
         return xy if self._longitude is None else near_longitude(xy, self._longitude, self.crs)
 
     @cached_property
     def _longitude(self) -> float | None:
-        """Where the model is on a map with longitudes.
+        """Longitude of the model's place, on a map with longitudes.
 
-        None: it has no place, or the input takes up so much of the Earth that there is no other
-        side that its positions could be taken for.
+        None: the model has no place, or the input spans half a turn or more, so that the turn in
+        which a position lies is ambiguous.
         """
         turn = full_turn(self.crs)
         if turn is None or self.model.frame.to_map == Affine.identity():
@@ -152,9 +153,9 @@ class Transform:
         Parameters
         ----------
         values
-            What `to_json` returned.
+            Result of `to_json`.
         folder
-            Where terrain models are looked for that are not where they were.
+            Folder to search for terrain models that are no longer at their stored path.
 
         Raises
         ------
@@ -176,13 +177,12 @@ class Transform:
 
 
 def as_positions(values: ArrayLike) -> FloatArray:
-    """Return positions as an array, shape (..., 2); of none the shape does not count.
+    """Return positions as an array, shape (..., 2); an empty array may have any shape.
 
     Raises
     ------
     ParameterError
-        They are no numbers, or the last axis holds something else, as where all x stand before all
-        y.
+        The positions are not numbers, or the last axis is not (x, y), as when all x precede all y.
     """
     try:
         positions = np.asarray(values, float)
@@ -217,18 +217,18 @@ def model_from_json(
     Parameters
     ----------
     values
-        What `to_json` returned.
+        Result of `to_json`.
     crs
         CRS of the map.
     folder
-        Where terrain models are looked for that are not where they were.
+        Folder to search for terrain models that are no longer at their stored path.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        The values describe none.
+        The values do not describe a model.
     GroundTieError
-        A terrain model cannot be opened, or is another one.
+        A terrain model cannot be opened, or its heights differ from the stored ones.
     """
     kind, frame = values["kind"], Frame(Affine(*(float(number) for number in values["frame"])))
     if not is_invertible(frame.to_map):

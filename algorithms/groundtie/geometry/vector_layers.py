@@ -1,10 +1,10 @@
-"""Vector layers: written as GeoPackages, and read where a damaged file cannot take the job down.
+"""Vector layers: written as GeoPackages, and read in a separate process.
 
-GDAL's vector drivers, or fiona around them, may crash on damaged files: a GeoPackage of 144 kB ends
-the interpreter by fiona 1.10. SQLite could check a GeoPackage beforehand, but that reads all of it,
-shows nothing of the geometries, and there is no such check of the other formats. So another process
-reads the layer, and its end is an error of that layer. It is a new one: a fork of QGIS, or of a
-process with GDAL's threads, would be none that works.
+GDAL's vector drivers, or fiona around them, may crash on damaged files: a GeoPackage of 144 kB
+crashes the interpreter with fiona 1.10. An SQLite check of a GeoPackage would read all of it
+without checking the geometries, and other formats have no such check. A separate process therefore
+reads the layer, and its crash is reported as an error of that layer. The process is a new one, as a
+fork of QGIS, or of a process with GDAL's threads, would not work.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..errors import GeoreferencingError, VectorLayerError, raised_by
 from ..rasters.grid import Grid, full_turn, require_both_or_none, require_map
 from . import layer_reader
 
-# The layers that masks and tie points come from are read in seconds.
+# Usual layers of masks and tie points are read in seconds.
 _PATIENCE_S = 120
 
 
@@ -37,9 +37,9 @@ class VectorLayer:
     Parameters
     ----------
     path
-        What messages call it.
+        Name of the file in messages.
     crs
-        Its CRS; None: unknown.
+        CRS of the layer; None: unknown.
     fields
         Names of the attributes.
     features
@@ -54,15 +54,15 @@ class VectorLayer:
     def on_map(self, grid: Grid) -> VectorLayer:
         """Return the features that have a geometry, on the map of a grid.
 
-        Those of a collection become features of their own, with its properties. Of a map with
-        longitudes, they are counted as the grid's are.
+        The parts of a geometry collection become separate features with its properties. Longitudes
+        are shifted by full turns to lie near the grid's.
 
         Raises
         ------
         GeoreferencingError
             Only one of the layer and the map has a CRS.
         VectorLayerError
-            A geometry cannot be taken to the map.
+            A geometry cannot be reprojected to the map.
         """
         crs = grid.crs
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
@@ -92,7 +92,7 @@ class VectorLayer:
 
 
 def _near_longitude(geometry: Any, longitude: float, turn: float) -> Any:
-    """Return a geometry whose middle is not more than half a turn from a longitude."""
+    """Return a geometry shifted by full turns to within half a turn of a longitude."""
     coordinates = geometry["coordinates"]
     seen = _longitudes(coordinates)
     turns = np.rint(((min(seen) + max(seen)) / 2 - longitude) / turn) if seen else 0
@@ -104,7 +104,7 @@ def _is_position(coordinates: Any) -> bool:
 
 
 def _longitudes(coordinates: Any) -> list[float]:
-    """Return those of all positions, however deep GeoJSON nests them."""
+    """Return the longitudes of all positions, at any depth of GeoJSON's nesting."""
     if _is_position(coordinates):
         return [coordinates[0]]
     return [x for part in coordinates for x in _longitudes(part)]
@@ -117,9 +117,9 @@ def _moved(coordinates: Any, by: float) -> Any:
 
 
 def simple_geometries(geometry: Any) -> list[Any]:
-    """Return the geometries of a collection, and of those in it, or the one that is none.
+    """Return the geometries of a collection, nested ones included, or the simple geometry itself.
 
-    As GeoJSON has them; of None there is none.
+    The geometries are as in GeoJSON; None has no geometries.
     """
     if geometry is None:
         return []
@@ -144,7 +144,7 @@ def read_vector_layer(path: str | os.PathLike[str]) -> VectorLayer:
         raise VectorLayerError(f"cannot read the vector layer {name}: {found['error']}")
     try:
         wkt = found["crs_wkt"]
-        # So GDAL calls the two that stand for none in a GeoPackage (OGC 12-128r18, 1.1.2.1.2).
+        # GDAL's name for a GeoPackage's two undefined CRSs (OGC 12-128r18, 1.1.2.1.2).
         is_known = wkt and '"Undefined ' not in wkt
         crs = require_map(CRS.from_wkt(wkt)) if is_known else None
     except (CRSError, GeoreferencingError) as error:
@@ -166,21 +166,21 @@ def write_vector_layer(
     path, name
         The file, and the layer's name.
     records
-        The features as GeoJSON has them.
+        The features as in GeoJSON.
     properties
         Types of the properties, by name.
     crs
-        Of the geometries; None: unknown.
+        CRS of the geometries; None: unknown.
 
     Raises
     ------
     OSError
-        Not everything could be written.
+        The layer could not be written completely.
     """
     from fiona.io import MemoryFile  # slow to load
 
     try:
-        # In memory: SQLite may meet a full disk in silence.
+        # In memory: SQLite may ignore a full disk silently.
         with MemoryFile(ext=".gpkg") as memory:
             with memory.open(
                 driver="GPKG",
@@ -198,11 +198,11 @@ def write_vector_layer(
 
 
 def _read_apart(name: str) -> dict[str, Any] | None:
-    """Return what `layer_reader` finds in a process of its own; None where none can be started."""
+    """Return the result of `layer_reader` in a separate process; None if none can be started."""
     python = _python()
     if python is None:
         return None
-    # It finds fiona where this process does: in QGIS the plugin's folder is on the path.
+    # The process must find fiona where this one does: in QGIS, the plugin's folder is on the path.
     folders = os.pathsep.join(folder for folder in sys.path if folder)
     try:
         done = subprocess.run(
@@ -212,7 +212,7 @@ def _read_apart(name: str) -> dict[str, Any] | None:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=_PATIENCE_S,
-            # Ctrl-C is for this process, which then ends its work in order.
+            # Ctrl-C must reach this process only, which then ends its work in order.
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
@@ -220,12 +220,12 @@ def _read_apart(name: str) -> dict[str, Any] | None:
         return {"error": f"it took more than {_PATIENCE_S} s"}
     if done.returncode == 0:
         return dict(json.loads(done.stdout))
-    # Python's own failures have code 1: an interpreter without fiona is none.
+    # Python's own failures have code 1: an interpreter without fiona does not count.
     return None if done.returncode == 1 else {"error": "it is damaged: GDAL crashes on it"}
 
 
 def _python() -> Path | None:
-    """Return Python's interpreter: within QGIS `sys.executable` may be QGIS, or empty."""
+    """Return the Python interpreter; within QGIS, `sys.executable` may be QGIS itself or empty."""
     own = Path(sys.executable or "-")
     beside = [
         Path(folder) / name

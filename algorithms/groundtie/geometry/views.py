@@ -1,7 +1,7 @@
-"""From where an image was taken: the sensor's azimuth and angle, and the sun's.
+"""Viewing geometry of an image: azimuth and incidence angle of the sensor, and the sun's position.
 
-Stated in words, by the STAC item that providers put beside an image (view extension, [STAC2021]),
-or by a product's own metadata (`product_views`).
+Views come from words, from the STAC item that providers put beside an image (view extension,
+[STAC2021]), or from a product's own metadata (`product_views`).
 """
 
 from __future__ import annotations
@@ -32,35 +32,36 @@ _WORD = re.compile(r"([a-z-]+)=(-?\d+(?:\.\d+)?)°?")
 
 _SUFFIXES = (".json", ".xml", ".imd")
 
-# What of these a user states, and the range of each.
+# The angles that a view can state, and the range of each.
 _RANGES = {
     "azimuth": (-360.0, 360.0),
     "incidence": (0.0, 80.0),
     "sun-azimuth": (-360.0, 360.0),
     "sun-elevation": (1.0, 90.0),
 }
-# Distance from the Earth's centre of a satellite that looks at the ground, 600 km high, over that
-# of the ground: what is 500 or 770 km high sees it at 1° more or less, 30° off nadir.
+# Distance of a satellite, 600 km high, from the Earth's centre in Earth radii. At 30° off nadir,
+# a height of 500 or 770 km changes the incidence angle by up to 1°.
 _ORBIT_RADII = 1 + 600 / 6371
 
-# A radar that looks straight down has no range on the ground.
+# A radar that looks straight down has no range resolution on the ground.
 _STEEPEST_RADAR_DEG = 5.0
 
 
 @dataclass(frozen=True)
 class View:
-    """From where an image was taken.
+    """Viewing geometry of an image.
 
     Parameters
     ----------
     sensor
         One of `SENSORS`.
     azimuth_deg
-        Where the sensor stands, seen from the ground, clockwise from the map's north.
+        Azimuth of the sensor, seen from the ground, clockwise from the map's north.
     incidence_deg
-        Angle between its line of sight and the vertical, on the ground.
+        Angle between the line of sight and the vertical, on the ground.
     sun_azimuth_deg, sun_elevation_deg
-        Where the sun stands, alike, and above the horizon; None: unknown, or of no matter.
+        Azimuth of the sun, likewise, and its elevation above the horizon; None: unknown, or
+        irrelevant.
     """
 
     sensor: str
@@ -71,20 +72,20 @@ class View:
 
     @classmethod
     def of(cls, image: Any, given: str | None) -> View | None:
-        """Return the view of an image as it was asked for, or of the metadata beside it.
+        """Return the view of an image, as given or from the metadata beside the image.
 
         Parameters
         ----------
         image
             The image, as `open_raster` takes it.
         given
-            The name of a STAC item or of a product's metadata, or words; None: what lies beside the
-            image under its own name is taken, a STAC item first.
+            The name of a STAC item or of a product's metadata file, or words; None: a file beside
+            the image under the image's name, a STAC item first.
 
         Raises
         ------
         ParameterError
-            What was given states no view.
+            The given file or words state no view.
         """
         if given is not None:
             return stated_view(given)
@@ -113,7 +114,7 @@ def no_view(image: Any, name: str) -> ParameterError:
 
 
 def split_views(words: str | None) -> tuple[str | None, str | None]:
-    """Return what is stated of the reference and of the input, as `reference; input`.
+    """Return the words for the reference and for the input, from `reference; input`.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def split_views(words: str | None) -> tuple[str | None, str | None]:
 
 
 def stated_view(given: str) -> View:
-    """Return the view that the name of a file, or words, state; `ParameterError` if none."""
+    """Return the view that a named file, or words, state; `ParameterError` if they state none."""
     if not given.lower().endswith(_SUFFIXES):
         return parse_view(given)
     path = Path(given)
@@ -144,7 +145,7 @@ def parse_view(text: str) -> View:
     Raises
     ------
     ParameterError
-        They state none.
+        The words state no view.
     """
     sensor, *words = text.replace(",", " ").lower().split() or [""]
     found = [_WORD.fullmatch(word) for word in words]
@@ -156,9 +157,9 @@ def parse_view(text: str) -> View:
 def read_view(path: Path) -> View:
     """Return the view that a STAC item states.
 
-    Its `view:azimuth` is that of the line of sight from the sensor to the ground. An item with any
-    property of the SAR extension is a radar's. From an angle off nadir follows the incidence angle
-    of a satellite's line of sight, which is larger as the Earth is round.
+    `view:azimuth` is the azimuth of the line of sight from the sensor to the ground. An item with
+    any property of the SAR extension is of a radar. If only the angle off nadir is given, the
+    incidence angle is computed from it; the Earth's curvature makes it larger.
 
     Raises
     ------
@@ -188,12 +189,12 @@ def read_view(path: Path) -> View:
 
 
 def _incidence_deg(off_nadir_deg: float) -> float:
-    """Return the angle from the vertical, on the ground, of what a satellite sees off nadir."""
+    """Return the incidence angle on the ground of a satellite's line of sight off nadir."""
     return math.degrees(math.asin(min(_ORBIT_RADII * math.sin(math.radians(off_nadir_deg)), 1.0)))
 
 
 def _product_view(path: Path) -> View | None:
-    """Return the view that a file beside an image states, if it is metadata that state one."""
+    """Return the view in a file beside an image; None if the file is not metadata with a view."""
     if not path.is_file():
         return None
     try:
@@ -228,7 +229,7 @@ def _view(sensor: str, values: Mapping[str, float], origin: str) -> View:
 
 
 def _is_item(path: Path) -> bool:
-    """Whether a file is a STAC item with a view: reports and transforms are JSON, too."""
+    """Whether a file is a STAC item with a view; reports and transforms are JSON files, too."""
     try:
         found = read_json(path)
     except (OSError, ValueError):

@@ -1,26 +1,25 @@
-"""Rasters: where they lie, reading windows of them, bringing them onto other grids, writing.
+"""Rasters: georeferencing, reading of windows, resampling onto other grids, writing.
 
-Where pixels lie
-    `grid` (geotransforms and CRSs), `windows` (rectangles of pixels), `tiling` (rasters worked tile
-    by tile), `target_grids` (which grid a registered raster gets).
+Positions of pixels
+    `grid` (geotransforms and CRSs), `windows` (rectangles of pixels), `tiling` (processing tile by
+    tile), `target_grids` (grids of registered rasters).
 Reading
-    `reading` (a raster that is open), `metadata` (what it states of itself), `handles` (files, open
-    datasets and arrays), `remote` (over a network), `remote_overviews` (reduced images there),
-    `averaging` (means over larger pixels), `nodata` (which numbers hold no data), `raster_masks`
-    (what rasters let take part), `radar_tags` (what states that it is a radar's).
-Onto other grids
-    `kernels` (interpolation), `lattice` (where all pixels of a grid lie in another image),
+    `reading` (open rasters), `metadata` (grid, bands and types), `handles` (files, open datasets
+    and arrays), `remote` (over a network), `remote_overviews` (reduced images there), `averaging`
+    (means over larger pixels), `nodata` (numbers without data), `raster_masks` (mask rasters),
+    `radar_tags` (radar metadata).
+Resampling
+    `kernels` (interpolation), `lattice` (positions of all pixels of a grid in another image),
     `warping` (an image's values there).
-What is matched
-    `pair` (two images on one matching grid), `patch` (a piece of one), `held_images` (in memory,
-    where they are read again and again), `colours` (classes of colour).
+Images to match
+    `pair` (two images on one matching grid), `patch` (a piece of an image), `held_images` (images
+    in memory, for repeated reading), `colours` (classes of colour).
 Heights
     `height_surfaces` (heights at any position, voids filled), `height_units` (heights in metres),
-    `rendered` (terrain as the sun or a radar shows it).
+    `rendered` (terrain models rendered as images).
 Writing
     `delivery` (registered rasters), `writing` (a GeoTIFF like another raster), `tiff_file`,
-    `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `whole` (a GeoTIFF of what
-    memory holds anyway), `vrt` (virtual rasters),
-    `atomic` (files that are whole or not there), `hidden_files` (until they are, and what dead runs
-    left).
+    `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `whole` (a GeoTIFF of a
+    raster in memory), `vrt` (virtual rasters), `atomic` (atomic outputs), `hidden_files` (temporary
+    files and leftovers).
 """

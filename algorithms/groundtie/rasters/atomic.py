@@ -1,4 +1,4 @@
-"""Outputs that are whole or not there: written beside their final name, renamed when complete."""
+"""Atomic outputs: written beside their final name, and renamed when complete."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from ..raster_names import is_only_raster_of_its_name, own_world_files, rpc_file
 from ..runs import has_written, run_tags, will_make
 from .hidden_files import Claim, final_name, hidden_name, new_token, remove
 
-# What GDAL and SQLite put beside a file, appended to its whole name.
+# Suffixes of the files that GDAL and SQLite put beside a file, appended to its whole name.
 SIDECARS = (".aux.xml", ".ovr", ".msk", "-wal", "-shm", "-journal")
 
 _ROLE = re.compile(r"-new(\.[^.]*)?$")
 
-# Of Linux and Windows, in bytes or characters.
+# Limit of Linux and Windows, in bytes or characters.
 LONGEST_NAME = 255
 
-# The rest of a hidden name takes up to 40.
+# The other parts of a hidden name take up to 40.
 _LONGEST_IN_HIDDEN = LONGEST_NAME - 40
 
 _FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
@@ -38,11 +38,11 @@ _FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 class Outputs:
     """The output files of one job, which appear together when all of them are complete.
 
-    Inside the `with` block they are written under hidden names in the folders of their final
-    names. Leaving the block renames them, in the order in which they were staged; leaving it by an
-    exception removes them. Sidecar files (`.aux.xml`) go along, just before their files; those of a
-    file that is replaced (`.msk`, `-wal`, RPCs, world files, …) disappear. What runs that died left
-    in these folders is removed.
+    Inside the `with` block they are written under hidden names in the folders of their final names.
+    Leaving the block renames them, in the order in which they were staged; leaving it by an
+    exception removes them. Sidecar files (`.aux.xml`) are renamed just before their files. Those of
+    a replaced file (`.msk`, `-wal`, RPCs, world files, …) are removed, as are leftovers of dead
+    runs in these folders.
     """
 
     def __init__(self) -> None:
@@ -56,18 +56,18 @@ class Outputs:
         return self
 
     def stage(self, path: str | os.PathLike[str]) -> Path:
-        """Return the name under which to write the output `path` for now; its suffix is kept.
+        """Return the temporary name under which to write the output `path`, with the same suffix.
 
         Raises
         ------
         OutputError
-            `path` is a folder, lies in none or in one that cannot be written to, has a name that
-            is too long, or was staged already.
+            `path` is a folder, its folder does not exist or cannot be written to, its name is too
+            long, or it was staged already.
         """
         final = Path(os.path.abspath(path))
         if final in self._staged:
             raise OutputError(f"output is named twice: {path}")
-        with writing(final):  # no system looks for a name that is too long
+        with writing(final):  # looking up a name that is too long fails
             is_folder = final.is_dir()
         if is_folder:
             raise OutputError(f"output is a folder, not a file: {path}")
@@ -78,14 +78,14 @@ class Outputs:
         return staged
 
     def staged(self, path: str | os.PathLike[str]) -> Path:
-        """Return where an output that was staged lies until all are complete.
+        """Return the temporary path of a staged output.
 
-        Renaming it changes neither its size nor its time.
+        The final renaming changes neither size nor time.
         """
         return self._staged[Path(os.path.abspath(path))]
 
     def withdraw(self, path: str | os.PathLike[str]) -> None:
-        """Remove what was written of an output, and stage it no longer: the others stand."""
+        """Remove a staged output and its file; the other outputs remain."""
         staged = self._staged.pop(Path(os.path.abspath(path)))
         for present in (*_sidecars(staged), staged):
             remove(present)
@@ -95,7 +95,7 @@ class Outputs:
             if kind is None:
                 self._commit()
         finally:
-            # After a commit there are but the old files.
+            # After a commit, only the second names of replaced files are left.
             for path in (*self._staged.values(), *self._aside.values()):
                 for present in (*_sidecars(path), path):
                     remove(present)
@@ -112,10 +112,10 @@ class Outputs:
         return folder / hidden_name(self._token, role, stem, final.suffix)
 
     def _commit(self) -> None:
-        """Put all files in their places, one by one; if one cannot be, undo all.
+        """Move all files to their places, one by one; if one fails, undo all.
 
-        At no moment is a final name missing that was there: a file is replaced in one step. For
-        this, all must be on the disk before the first is.
+        A file is replaced in one step, so that an existing final name is never missing. All files
+        must therefore be on the disk before the first one is moved.
         """
         missing = [final for final, staged in self._staged.items() if not staged.exists()]
         if missing:
@@ -130,7 +130,7 @@ class Outputs:
             for final, staged in self._staged.items():
                 stale = self._stale(final)
                 self._keep(final, *stale)
-                # Before it is replaced: statistics or a mask of another file would be wrong.
+                # Before the file is replaced: statistics or a mask of the old file would be wrong.
                 for sidecar in stale:
                     sidecar.unlink()
                 for path in (*_sidecars(staged), staged):
@@ -145,22 +145,22 @@ class Outputs:
                 raise OutputError(f"cannot write {final}: {_reason(error)}") from error
             raise
         for folder in self._claims:
-            # Not all systems open folders, nor do all disks need it.
+            # Not all systems can open folders, and not all disks need this.
             with contextlib.suppress(OSError):
                 _flush(folder)
 
     def _keep(self, *files: Path) -> None:
-        """Give files a second name, by which to undo that they are replaced."""
+        """Give files a second name, from which they can be restored."""
         for old in files:
             aside = self._hidden(old, "old")
-            # Some disks know no second names: what is replaced there cannot be undone.
+            # Some disks lack hard links: replaced files cannot be restored there.
             with contextlib.suppress(OSError):
                 os.link(old, aside)
                 self._aside[old] = aside
 
     def _stale(self, final: Path) -> list[Path]:
-        """Return what lies beside a file and would be wrong for another one of its name."""
-        # GDAL takes what RPCs lie beside a raster for the raster's own, and world files, too.
+        """Return the files beside a file that would be wrong for its replacement."""
+        # GDAL takes RPCs and world files beside a raster for the raster's own.
         rpcs = [path for path in rpc_files(final) if path not in self._staged]
         is_own = bool(rpcs) and is_only_raster_of_its_name(final)
         return [*_sidecars(final), *(rpcs if is_own else ()), *own_world_files(final)]
@@ -175,14 +175,14 @@ class Outputs:
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str], needed: int | None = None) -> Iterator[None]:
-    """Turn what goes wrong while `path` is written into `OutputError`, with the name and reason.
+    """Turn errors while `path` is written into `OutputError`, with the name and reason.
 
     Parameters
     ----------
     path
-        The output; for one that is staged the message gives its final name.
+        The output; for a staged output, the message gives its final name.
     needed
-        Its size in bytes, where that is known.
+        Size of the output in bytes, if known.
     """
     try:
         yield
@@ -197,7 +197,7 @@ def writing(path: str | os.PathLike[str], needed: int | None = None) -> Iterator
 
 
 def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) -> None:
-    """Write values, and the id of the call that makes them (see `runs`), as strict JSON.
+    """Write values, and the id of the call that produces them (see `runs`), as strict JSON.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those that it lies in, if it is not there; errors as `writing`.
+    """Make a folder and its parents if they do not exist; errors as `writing`.
 
     If it is still empty when the call of the tool ends, it is removed (see `runs`).
     """
@@ -220,7 +220,7 @@ def make_folder(folder: Path) -> None:
 
 
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> None:
-    """Write rows, by the names of their columns, as a CSV table.
+    """Write rows, given by column name, as a CSV table.
 
     Raises
     ------
@@ -235,8 +235,8 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, An
 
 @contextlib.contextmanager
 def scratch_file(path: Path) -> Iterator[Path]:
-    """Give the name of a file beside a staged output that its job alone needs, and remove it."""
-    # The same token: should the job be killed, this file is a leftover, too.
+    """Yield the name of a temporary file beside a staged output, and remove the file afterwards."""
+    # The same token as the output, so that the file of a killed job is a leftover, too.
     scratch = path.with_name(_ROLE.sub(r"-tmp\1", path.name))
     if scratch == path:
         scratch = path.with_name(hidden_name(new_token(), "tmp", path.stem, path.suffix))
@@ -248,12 +248,12 @@ def scratch_file(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Make a folder for files that nobody else needs, among the system's temporary ones.
+    """Make a private folder among the system's temporary ones, and remove it afterwards.
 
     Raises
     ------
     OutputError
-        There is no place for it.
+        The folder cannot be made.
     """
     parent, token = Path(tempfile.gettempdir()), new_token()
     folder = parent / hidden_name(token, "tmp", "scratch")
@@ -274,9 +274,9 @@ def no_space(path: str | os.PathLike[str], needed: float | None = None) -> Outpu
     Parameters
     ----------
     path
-        What is written, complete or not.
+        The file being written, complete or not.
     needed
-        How many bytes it would have, if that is known.
+        Its complete size in bytes, if known.
     """
     final = Path(final_name(path))
     free = free_bytes(path)
@@ -287,11 +287,11 @@ def no_space(path: str | os.PathLike[str], needed: float | None = None) -> Outpu
 
 
 def free_bytes(path: str | os.PathLike[str]) -> int:
-    """Return how large a file may become, which may be there in part."""
+    """Return the largest possible size of a file, which may already exist in part."""
     path = Path(path)
     taken = path.stat().st_size if path.exists() else 0
     usage = shutil.disk_usage(path.parent)
-    # Some network disks do not tell.
+    # Some network disks do not report their size.
     return usage.free + taken if usage.total else sys.maxsize
 
 
@@ -304,7 +304,7 @@ def _size(count: float) -> str:
 
 
 def _reason(error: Exception) -> str:
-    # rasterio points to the exception before: that one states what happened.
+    # rasterio chains its exception to the one with the actual reason.
     cause = error.__cause__ or error
     return getattr(cause, "strerror", None) or str(cause) or type(cause).__name__
 
@@ -319,7 +319,7 @@ def _beside(path: Path, suffix: str) -> Path:
 
 
 def _flush(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+    """Wait until a file, or the entries of a folder, are on the disk."""
     descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         os.fsync(descriptor)

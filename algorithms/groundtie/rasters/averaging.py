@@ -1,4 +1,4 @@
-"""Means over the area of larger pixels, in which invalid pixels carry no weight."""
+"""Means over the areas of larger pixels, in which invalid pixels carry no weight."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Read = Callable[["RasterSource", Window], tuple[NDArray[Any], Mask]]
 # A larger pixel is valid if at least this share of its area is.
 MIN_VALID_SHARE = 0.5
 
-# Pixels that are held at a time: many blocks of a file, as those at the border are read twice.
+# Pixels held at a time: many blocks of a file, as blocks at the border are read twice.
 HELD_PIXELS = 2048**2
 
 
 def overlaps(edges: NDArray[np.float64], count: int, dtype: Any = np.float32) -> sparse.csr_matrix:
-    """Return how much of each of `count` pixels lies in each interval.
+    """Return the share of each of `count` pixels that lies in each interval.
 
     Parameters
     ----------
     edges
-        Borders of the n intervals, rising, shape (n + 1,); pixel i reaches from i to i + 1.
+        Borders of the n intervals, rising, shape (n + 1,); pixel i extends from i to i + 1.
     count
         Number of pixels in the row or column.
     dtype
-        Of the result.
+        Type of the result.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def area_average(
     Parameters
     ----------
     values
-        Floating-point or complex image, shape (h, w); invalid pixels hold anything finite.
+        Floating-point or complex image, shape (h, w), finite in invalid pixels, too.
     valid
         Which pixels count, shape (h, w).
     row_edges, col_edges
@@ -94,16 +94,16 @@ def area_average(
 def average_window(
     read: Read, source: RasterSource, level: RasterSource, window: Window, shape: tuple[int, int]
 ) -> tuple[NDArray[Any], Mask]:
-    """Average a window of a raster to a smaller size, without ever holding all of it.
+    """Average a window of a raster to a smaller size, without holding all of it in memory.
 
     Parameters
     ----------
     read
         Returns values and validity of a window of the raster or of a level, ([bands,] h, w).
     source, level
-        The raster, and the image of it that is read: itself, or an overview.
+        The raster, and the level of it that is read: the raster itself, or an overview.
     window
-        In pixels of the raster.
+        Window in pixels of the raster.
     shape
         Height and width of the result.
 
@@ -138,10 +138,10 @@ def average_window(
 def _edges(
     first: int, side: int, count: int, sizes: tuple[int, int]
 ) -> tuple[int, NDArray[np.float64]]:
-    """Return the first pixel of a level that a window needs, and larger pixels' borders from it.
+    """Return the first pixel of a level that a window needs, and the larger pixels' borders.
 
-    Along one axis: of a window of `side` pixels from `first` on, in `count` parts; `sizes` are the
-    raster's and the level's.
+    Along one axis, for a window of `side` pixels from `first` on, divided into `count` parts; the
+    borders are counted from that first pixel. `sizes` are the raster's and the level's.
     """
     whole, reduced = sizes
     start = int(np.floor(first * reduced / whole))
@@ -152,9 +152,9 @@ def _edges(
 def weighted_sums(
     down: sparse.csr_matrix, across: sparse.csr_matrix, values: NDArray[Any]
 ) -> NDArray[Any]:
-    """Return the sums of an image over rectangles, of whose sides `overlaps` states the pixels."""
-    # Rows first: that runs along contiguous memory and leaves little for the second product.
+    """Return the sums of an image over rectangles whose sides are given by `overlaps`."""
+    # Rows first: this runs along contiguous memory and leaves little for the second product.
     lines = down @ values
-    # OpenCV, which has no complex numbers, turns images of 2^n columns in a fifth of the time.
+    # OpenCV, which lacks complex numbers, transposes images of 2^n columns in a fifth of the time.
     turned = np.ascontiguousarray(lines.T) if np.iscomplexobj(lines) else cv2.transpose(lines)
     return np.asarray((across @ turned).T)

@@ -1,7 +1,7 @@
-"""Classes of colour: what several bands show of the ground beyond how bright it is.
+"""Classes of colour: information of several bands on the ground beyond its brightness.
 
-A joint histogram of classes needs no order among them. Grass, water and asphalt differ in colour
-where they are as bright as each other.
+Grass, water and asphalt may be equally bright and differ in colour. A joint histogram does not need
+an order of the classes.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 
 from .windows import FloatImage, Mask
 
-# Equally frequent levels of brightness and of colour.
+# Numbers of equally frequent levels of brightness and of colour.
 _BRIGHTNESS, _HUES = 12, 4
 
-# Comparing pixels with so many edges, one after the other, is faster than to search among them.
+# Up to this many edges, comparing all pixels with each edge is faster than a binary search.
 _FEW_EDGES = 63
 
-# Of so many pixels, quantiles are known to 0.2 % of all pixels.
+# With this many pixels, quantiles are accurate to 0.2 % of all pixels.
 _MOST_PIXELS = 100_000
 
-# Values are no less than this share of the brightest before their logarithm is taken.
+# Before logarithms are taken, values are raised to at least this share of the brightest.
 _DARKEST = 1e-3
 
 
 @dataclass(frozen=True)
 class Colours:
-    """Levels of brightness, and of the component of colour that varies most.
+    """Levels of brightness, and of the colour component with the largest variance.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Colours:
     hue_edges
         Inner edges between levels of that component, shape (hues - 1,).
     darkest
-        Values are no less than this before their logarithm is taken.
+        Lower limit of values before their logarithm is taken.
     """
 
     brightness_edges: FloatImage
@@ -59,7 +59,7 @@ class Colours:
             Which pixels count, shape (h, w).
         """
         every = max(int(np.count_nonzero(valid)) // _MOST_PIXELS, 1)
-        # Not by the mask, which would copy all pixels first.
+        # Not indexed by the mask, which would first copy all pixels.
         values = bands.reshape(len(bands), -1)[:, np.flatnonzero(valid)[::every]]
         darkest = max(_DARKEST * float(np.percentile(values, 99)), 1e-9)
         hues = _hues(values, darkest)
@@ -84,7 +84,7 @@ class Colours:
 
 
 def levels(values: FloatImage, edges: FloatImage) -> NDArray[np.uint8]:
-    """Return how many of up to 254 rising edges lie at or below each value, same shape."""
+    """Return the number of edges, rising and up to 254, at or below each value, same shape."""
     if len(edges) > _FEW_EDGES:
         return np.searchsorted(edges, values, side="right").astype(np.uint8)
     found = np.zeros(values.shape, np.uint8)
@@ -94,7 +94,7 @@ def levels(values: FloatImage, edges: FloatImage) -> NDArray[np.uint8]:
 
 
 def _hues(bands: FloatImage, darkest: float) -> FloatImage:
-    """Return the logarithms of bands without that of their geometric mean."""
+    """Return the logarithms of bands minus that of their geometric mean."""
     logarithms = np.log(np.maximum(bands, np.float32(darkest)))
     return np.asarray(logarithms - logarithms.mean(axis=0), np.float32)
 

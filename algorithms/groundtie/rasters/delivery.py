@@ -1,4 +1,4 @@
-"""Registered rasters: resampled onto another grid, or untouched with another geotransform."""
+"""Registered rasters: resampled onto another grid, or unchanged with another geotransform."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from .warping import read_around, reduction, resample
 from .windows import Mask, Window
 from .writing import chosen_nodata, create_like, different_masks, put_nodata, shared_nodata
 
-# Share of the work that is left when all pixels are written: overviews.
+# Share of the work that overviews take, after all pixels are written.
 _OVERVIEWS = 0.1
 
-# Bands that are resampled together share their weights, which take as long as one of them.
+# Bands resampled together, with shared weights: computing these takes as long as one band.
 _BANDS = 4
 
-# Types of complex numbers with parts that may be NaN.
+# Complex types whose parts may be NaN.
 _COMPLEX = ("complex64", "complex128")
 
 
 @dataclass(frozen=True)
 class _Warp:
-    """What all tiles of one raster share."""
+    """Parameters common to all tiles of a raster."""
 
     source: RasterSource
     to_input_px: PointFunction
@@ -65,8 +65,8 @@ class _Warp:
 
     @cached_property
     def leaves_gaps(self) -> bool:
-        """Whether there may be pixels without data that nothing but a mask can mark."""
-        # Complex numbers may be NaN, which nobody needs to declare.
+        """Whether there may be pixels without data that only a mask can mark."""
+        # Complex numbers may be NaN, which is invalid without a declaration.
         may_be_nan = any(band.dtype in _COMPLEX for band in self.source.bands)
         return self.source.has_mask_band or (self.is_bare and (may_be_nan or not _is_covered(self)))
 
@@ -75,11 +75,11 @@ class _Warp:
     ) -> Iterator[tuple[Window, tuple[int, ...], NDArray[Any], Mask, bool]]:
         """Yield all tiles in groups of bands: place, bands, values, validity, whether any is valid.
 
-        The validity is that of the first band, (h, w); the last word is that of the group.
+        The validity is that of the first band, (h, w); the last value refers to the whole group.
         """
         count = tile_count(self.target) * len(self.groups)
         only_masked = self.is_bare and self.leaves_gaps
-        # One by one: there may be any number of them.
+        # A generator: there may be any number of tiles.
         tasks = ((tile, group) for tile in tiles(self.target) for group in self.groups)
         found = in_order(pool, lambda task: (*task, *self.tile(task)), tasks, ahead)
         for i, (place, bands, values, valid) in enumerate(found):
@@ -126,15 +126,15 @@ def warp_raster(
     workers: int = 2,
     progress: Progress = SILENT,
 ) -> bool:
-    """Resample a raster onto a grid, once, from its original pixels, into a GeoTIFF.
+    """Resample a raster onto a grid into a GeoTIFF, in one step from its original pixels.
 
-    Returns whether any of its pixels is valid.
+    Returns whether any pixel of the result is valid.
 
     Memory is bounded: tiles are read, resampled and written one by one. Bands, dtype, colours,
-    names and metadata are kept (see `writing.create_like`). Where there are no pixels, the result
-    has the input's nodata value; a transparent alpha band if it has one; otherwise NaN in real
-    floating-point rasters, and in all others 0 beside an internal mask. An input's mask band
-    becomes an internal mask. Rasters with a palette are always resampled by `nearest`.
+    names and metadata are kept (see `writing.create_like`). Pixels without data get the input's
+    nodata value, or a transparent alpha band if the input has one. Otherwise they are NaN in real
+    floating-point rasters, and 0 with an internal mask in all others. An input's mask band becomes
+    an internal mask. Rasters with a palette are always resampled by `nearest`.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ def warp_raster(
     path
         The GeoTIFF to write; see `atomic.Outputs.stage` and `writing.create_like`.
     resampling
-        One of `warping.METHODS`. Where the target's pixels are larger than 1.5 input pixels,
-        the mean over the area is taken first (not with `nearest`).
+        One of `warping.METHODS`. If the target's pixels are larger than 1.5 input pixels, means
+        over the area are taken first (not with `nearest`).
     workers
         Number of threads.
     progress
@@ -161,8 +161,8 @@ def warp_raster(
     RasterOpenError
         The pixels cannot be read.
     ParameterError
-        The pixel type cannot hold the raster's nodata value, or bands hold no data in different
-        ways (see `writing.shared_nodata`).
+        The pixel type cannot hold the raster's nodata value, or bands mark missing data in
+        different ways (see `writing.shared_nodata`).
     CancelledError
         The user cancelled.
     """
@@ -200,13 +200,13 @@ def warp_to_array(
 ) -> Raster:
     """Resample a raster onto a grid, as `warp_raster` does, into an array.
 
-    Parameters, errors and pixels are those of `warp_raster`; where that writes a mask into its
-    file, the array is a masked one.
+    Parameters, errors and pixels are those of `warp_raster`; if that writes a mask into its file,
+    the array is a masked array.
 
     Returns
     -------
     Raster
-        Of shape (bands, h, w), dtype of the raster.
+        Shape (bands, h, w), dtype of the raster.
     """
     warp = _Warp.of(source, to_input_px, target, resampling)
     values = np.empty((source.count, target.height, target.width), source.dtype)
@@ -230,18 +230,18 @@ def write_with_geotransform(
     rpc_tags: Mapping[str, str] | None = None,
     progress: Progress = SILENT,
 ) -> None:
-    """Write a raster's pixels, untouched, with another geotransform and CRS into a GeoTIFF.
+    """Write a raster's unchanged pixels with another geotransform and CRS into a GeoTIFF.
 
     Parameters
     ----------
     source
         The raster.
     grid
-        Its new grid, of the same size.
+        The new grid, of the same size.
     path
         The GeoTIFF to write; see `atomic.Outputs.stage`.
     rpc_tags
-        RPCs that locate it, as GDAL's metadata domain RPC.
+        RPCs that locate the raster, as in GDAL's metadata domain RPC.
     progress
         Receives every tile.
 

@@ -1,4 +1,4 @@
-"""Where the pixels of a raster lie.
+"""Grids: the positions of a raster's pixels on the map.
 
 This is the only module that converts between the corner-based geotransforms of files (GDAL,
 rasterio, QGIS: the first pixel's corner is at 0) and the centre-based pixel coordinates used
@@ -25,7 +25,7 @@ from ..errors import GeoreferencingError, raised_by
 
 FloatArray = NDArray[np.float64]
 
-# Takes positions, shape (n, 2), to values at them, (n, k): mostly to other positions.
+# From positions, shape (n, 2), to values at them, (n, k): mostly to other positions.
 PointFunction = Callable[[FloatArray], FloatArray]
 
 # Longitude and latitude.
@@ -34,31 +34,31 @@ LON_LAT = CRS.from_epsg(4326)
 # Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
 METRES_PER_DEGREE = 111_195.0
 
-# No unit shrinks by more than this towards a pole, whose own units have no length.
+# Lower limit for the shrinking of units towards a pole, where their length is 0.
 _LEAST_SHRINK = 1e-6
 
-# The name of a datum and the parameters that lead to WGS 84, in WKT 1.
+# The name of a datum and its parameters of the transformation to WGS 84, in WKT 1.
 _DATUM = re.compile(r'DATUM\["[^"]*"|TOWGS84\[[^]]*\]')
 
 # The ellipsoid of WGS 84: equatorial radius, flattening, and square of the eccentricity.
 _RADIUS_M, FLATTENING = 6_378_137.0, 1 / 298.257223563
 _ECCENTRICITY2 = FLATTENING * (2 - FLATTENING)
 
-# The scale of maps for surveys is nearer than this to 1, and their unit is taken as what it says.
-# That of UTM goes from 0.9996 at a zone's middle to 1.001 at its borders, 3° off: (3°)² / 2 is
-# 0.0014. National grids have as much, or a few times as much where they span a large country.
+# The scale of survey maps differs from 1 by less than this, and their unit is taken at face value.
+# The scale of UTM ranges from 0.9996 at a zone's middle to 1.001 at its borders, 3° away: (3°)² / 2
+# is 0.0014. National grids deviate as much, or a few times as much in a large country.
 _SURVEY_SCALE = 0.01
 
-# Steps over which the length of a map's units is measured.
+# Step over which the length of a map's units is measured.
 _STEP_M = 1000.0
 
-# Units of maps lie between millimetres and thousands of kilometres, in metres.
+# Units of maps, in metres, lie between the inverse of this and this.
 _LARGEST_UNIT_M = 1e6
 
-# Positions that come through projections, or are interpolated in their place, are known to this.
+# Accuracy of positions that are projected, or interpolated between projected ones.
 POSITION_ERROR_PX = 1e-3
 
-# GDAL counts the pixels of a side in 32 bits.
+# GDAL counts the pixels of a side with signed 32 bits.
 MOST_PX = 2**31 - 1
 
 # Geotransform of images without georeferencing: map positions are then pixel coordinates.
@@ -78,8 +78,8 @@ class Grid:
     width, height
         Size in pixels.
     is_on_pixels
-        Whether the map is the pixels of a raster without georeferencing, of which these are
-        others than its own.
+        Whether the map consists of the pixels of a raster without georeferencing, and this grid has
+        different pixels on it.
     """
 
     transform: Affine
@@ -107,14 +107,14 @@ class Grid:
         return apply_affine(~self.centre_transform, xy)
 
     def to_pixels_of(self, other: Grid) -> PointFunction:
-        """Return the function from map positions, as this grid has them, to another's pixels."""
+        """Return the function from positions on this grid's map to the pixels of another grid."""
         return lambda xy: other.map_to_pixel(other.to_own_map(xy, self.crs))
 
     def to_own_map(self, xy: FloatArray, crs: CRS | None) -> FloatArray:
         """Return positions of another CRS, shape (n, 2), on this grid's map, as `reproject`.
 
-        Longitudes are counted as the grid's are, not more than half a turn from its middle: from
-        -180° or from 0°, or beyond the antimeridian.
+        Longitudes are brought to within half a turn of the grid's middle, whether the grid counts
+        from -180°, from 0° or beyond the antimeridian.
         """
         middle = self.pixel_to_map([self.centre_px])[0, 0]
         return near_longitude(reproject(xy, crs, self.crs), middle, self.crs)
@@ -137,7 +137,7 @@ class Grid:
 
     @property
     def geotransform(self) -> Affine | None:
-        """What a raster on it states; None where its own pixels are the map."""
+        """Geotransform for a raster on this grid; None if its own pixels are the map."""
         return None if self.transform == PIXEL_COORDINATES else self.transform
 
     @cached_property
@@ -150,7 +150,7 @@ class Grid:
     def metres_per_unit(self) -> tuple[float, float]:
         """Metres per map unit along x and y at the grid's centre (1 without a CRS).
 
-        Of a map that is sheared there, y counts at right angles to x, so that areas are right.
+        On a map that is sheared there, y is measured at right angles to x, so that areas are right.
         """
         if self.crs is None:
             return 1.0, 1.0
@@ -167,7 +167,7 @@ class Grid:
 
     @cached_property
     def pixel_size_m(self) -> float:
-        """Side of the square as large as a pixel, in metres (in pixels without georeferencing)."""
+        """Side of a square with a pixel's area, in metres (in pixels without georeferencing)."""
         t = self.transform
         area = abs(t.a * t.e - t.b * t.d) * self.metres_per_unit[0] * self.metres_per_unit[1]
         return float(np.sqrt(area))
@@ -180,9 +180,9 @@ class Grid:
 
     @property
     def metres_per_pixel(self) -> float | None:
-        """Metres of a pixel along its longer side: no error in pixels is stated too small by it.
+        """Length of a pixel's longer side in metres, so that errors are not understated.
 
-        None without georeferencing, where nobody knows it.
+        None without georeferencing.
         """
         return max(self.pixel_sides_m) if self.is_georeferenced else None
 
@@ -192,7 +192,7 @@ class Grid:
         return (self.width - 1) / 2, (self.height - 1) / 2
 
     def scaled(self, factor: float) -> Grid:
-        """Return the grid of pixels `factor` times as large from the same corner, cut to fit."""
+        """Return the grid of whole pixels `factor` times as large, from the same corner."""
         if factor == 1:
             return self
         width, height = (max(int(side / factor + 1e-6), 1) for side in self.size)
@@ -209,18 +209,18 @@ class Grid:
         return self.on_same_map(place, *self.size)
 
     def on_same_map(self, transform: Affine, width: int, height: int) -> Grid:
-        """Return other pixels on the map of these."""
+        """Return a grid of other pixels on the same map."""
         return Grid(transform, self.crs, width, height, is_on_pixels=not self.is_georeferenced)
 
     def on_own_pixels(self) -> Grid:
-        """Return these pixels as their own map, wherever they lie on another."""
+        """Return these pixels as their own map, without georeferencing."""
         return Grid(PIXEL_COORDINATES, None, *self.size)
 
     def outline(self, points_per_side: int = 21) -> FloatArray:
         """Return pixel positions along the outer border, shape (4 n, 2), in order."""
         along = np.linspace(0, 1, points_per_side, endpoint=False)
         x = np.concatenate([along, np.ones_like(along), 1 - along, np.zeros_like(along)])
-        # Rows are along a side what columns are along the one before.
+        # Rows vary along a side as columns do along the previous side.
         unit = np.column_stack([x, np.roll(x, points_per_side)])
         return np.asarray(unit * self.size - 0.5)
 
@@ -240,7 +240,7 @@ class Grid:
         Raises
         ------
         KeyError, TypeError, ValueError, CRSError
-            The values describe none.
+            The values do not describe a grid.
         """
         transform = Affine.from_gdal(*map(float, values["geotransform"]))
         width, height = int(values["width"]), int(values["height"])
@@ -259,7 +259,7 @@ def mesh(cols: ArrayLike, rows: ArrayLike) -> FloatArray:
 
 
 def finite(points: FloatArray) -> FloatArray:
-    """Return those of some positions, shape (n, 2), that are finite."""
+    """Return the finite positions of `points`, shape (n, 2)."""
     return points[np.isfinite(points).all(axis=1)]
 
 
@@ -271,13 +271,13 @@ def is_invertible(transform: Affine) -> bool:
 
 
 def require_map(crs: CRS | None) -> CRS | None:
-    """Return a CRS if it is one of maps: projected or geographic, or none at all.
+    """Return a CRS if it is the CRS of a map, projected or geographic, or None.
 
     Raises
     ------
     GeoreferencingError
-        It is local (engineering), geocentric or vertical: nothing leads from it to a map. Or its
-        unit is none of lengths, or it holds what no file can carry.
+        The CRS is local (engineering), geocentric or vertical, without a relation to a map. Or its
+        unit is not a unit of length, or the CRS cannot be written to a file.
     """
     if crs is None:
         return None
@@ -299,22 +299,21 @@ def require_map(crs: CRS | None) -> CRS | None:
 
 
 def full_turn(crs: CRS | None) -> float | None:
-    """Return a full turn of longitude in map units; None: the map has no longitudes."""
+    """Return a full turn of longitude in map units; None if the map has no longitudes."""
     if crs is None or not crs.is_geographic:
         return None
     return 360 / _degrees_per_unit(crs)
 
 
 def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | None) -> FloatArray:
-    """Return positions of a map, shape (n, 2), not more than half a turn from a longitude.
+    """Return positions, shape (n, 2), shifted by full turns to within half a turn of a longitude.
 
     Parameters
     ----------
     xy
-        The positions; of a map without longitudes they stay as they are.
+        The positions; on a map without longitudes they stay unchanged.
     longitude
-        One for all, or one for each, shape (n, 1): of the ways to count a longitude, which differ
-        by full turns, positions get the one of this.
+        One longitude for all positions, or one for each, shape (n, 1).
     crs
         CRS of the map.
     """
@@ -329,7 +328,7 @@ def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | Non
 
 def _degrees_per_unit(crs: CRS) -> float:
     """Return the unit of a geographic CRS in degrees."""
-    # WKT has it with 15 digits.
+    # WKT holds it with 15 digits.
     return round(float(np.rad2deg(crs.units_factor[1])), 12)
 
 
@@ -338,9 +337,10 @@ def _is_for_surveys(scale: tuple[float, float]) -> bool:
 
 
 def _scale_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:
-    """Return how many times as long as its unit, in metres, a projected map's units are.
+    """Return the ratio of ground length to nominal length of a projected map's units.
 
-    At a position, along x and at right angles to that; 1 where nothing leads to the ground.
+    The ratios hold at a position, along x and at right angles to x; 1 outside of the projection's
+    domain.
     """
     along = np.array([[-0.5, 0], [0, -0.5], [0.5, 0], [0, 0.5]]) * (_STEP_M / unit_m)
     before, after = np.split(_earth_centred(reproject(centre + along, crs, LON_LAT)), 2)
@@ -353,9 +353,9 @@ def _scale_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[f
 
 
 def _earth_centred(lon_lat: FloatArray) -> FloatArray:
-    """Return places, (n, 2) in degrees, as x, y and z from the middle of the Earth, (n, 3).
+    """Return geocentric coordinates, (n, 3), of longitudes and latitudes in degrees, (n, 2).
 
-    So distances meet neither poles nor an antimeridian.
+    Distances in them are not affected by poles or the antimeridian.
     """
     # Positions outside of a projection's domain are infinite.
     with np.errstate(invalid="ignore"):
@@ -368,12 +368,12 @@ def _earth_centred(lon_lat: FloatArray) -> FloatArray:
 
 def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> tuple[float, float]:
     """Return the metres per map unit along x and y at a position (1 without a CRS)."""
-    # The only pixel of a grid lies around it.
+    # The only pixel of this grid is centred on the position.
     return Grid(Affine.translation(*(np.asarray(xy) - 0.5)), crs, 1, 1).metres_per_unit
 
 
 def require_both_or_none(one: CRS | None, other: CRS | None, names: str) -> None:
-    """Raise `GeoreferencingError` if only one of two maps, of these names, has a CRS."""
+    """Raise `GeoreferencingError` if only one of two maps, named in `names`, has a CRS."""
     if (one is None) != (other is None):
         raise GeoreferencingError(f"only one of {names} has a CRS")
 
@@ -383,21 +383,21 @@ _product = operator.matmul if hasattr(Affine, "__matmul__") else operator.mul
 
 
 def epsg_of(crs: CRS) -> int | None:
-    """Return the EPSG code of exactly this CRS; None: there is none."""
+    """Return the EPSG code of exactly this CRS; None if it has none."""
     code = crs.to_epsg()
     return code if code is not None and _is_same(CRS.from_epsg(code), crs) else None
 
 
 def crs_name(crs: CRS) -> str:
-    """Return a short text that means exactly this CRS: its code, else its WKT."""
-    # GDAL's code may be the nearest one, which has another datum than an unknown one, or one with
-    # parameters of its own.
+    """Return a short text that identifies exactly this CRS: its code, else its WKT."""
+    # GDAL may return the nearest code, whose datum differs from an unknown datum or from one with
+    # custom parameters.
     name = str(crs.to_string())
     return name if _is_same(CRS.from_user_input(name), crs) else str(crs.to_wkt())
 
 
 def _is_same(one: CRS, other: CRS) -> bool:
-    # For rasterio before 1.4 those with the same nearest code are equal.
+    # For rasterio before 1.4, CRSs with the same nearest code are equal.
     datum, others = (_DATUM.findall(crs.to_wkt()) for crs in (one, other))
     return bool(one == other) and datum == others
 
@@ -427,7 +427,7 @@ def apply_affine(transform: Affine, points: ArrayLike) -> FloatArray:
 
 
 def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatArray:
-    """Return positions, shape (n, 2), in another CRS; without a CRS they stay as they are.
+    """Return positions, shape (n, 2), in another CRS; without a CRS they stay unchanged.
 
     Positions outside of a projection's domain become infinite.
     """
@@ -438,7 +438,7 @@ def reproject(xy: FloatArray, source: CRS | None, target: CRS | None) -> FloatAr
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise
-        # One position outside fails them all: halves find which.
+        # One position outside the domain fails them all: bisect to find it.
         if len(xy) == 1:
             return np.full((1, 2), np.inf)
         half = len(xy) // 2

@@ -1,4 +1,4 @@
-"""What pixels are read from: GDAL's handles of a file, a dataset that is open, or an array."""
+"""Sources of pixels: GDAL's handles of a file, an open dataset, or an array."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ if TYPE_CHECKING:
 
 
 class Handles(Protocol):
-    """Lends something with rasterio's `read` and `read_masks` to one thread at a time."""
+    """Lends objects with rasterio's `read` and `read_masks`, each to one thread at a time."""
 
     @property
     def identity(self) -> Hashable:
-        """The same for one and the same raster."""
+        """Key that is equal for handles of the same raster."""
 
     def borrow(self) -> contextlib.AbstractContextManager[Any]:
-        """Lend it; what goes wrong while reading with it becomes `RasterOpenError`."""
+        """Lend an object; errors while reading with it become `RasterOpenError`."""
 
     def close(self) -> None:
-        """Give up what was opened here."""
+        """Close everything that was opened here."""
 
 
 class FileHandles:
     """GDAL's handles of one file: each is used by one thread at a time, as GDAL demands.
 
-    Each handle decompresses blocks for itself, so that threads whose windows have blocks in common
-    take turns with one: two of them take 1.6 times the processor time, and are no faster. Servers
-    are asked by all threads at once.
+    Each handle decompresses blocks for itself, so that threads, whose windows share blocks, take
+    turns with one handle: two handles take 1.6 times the processor time, and are no faster. Remote
+    files are read by all threads at once.
 
     Parameters
     ----------
     path
-        The file or GDAL's name.
+        The file, or GDAL's name.
     overview
-        Number of the overview that is read, from 0; None: the raster itself.
+        Number of the overview to read, from 0; None: the raster itself.
     """
 
     def __init__(self, path: str, overview: int | None = None) -> None:
@@ -64,7 +64,7 @@ class FileHandles:
 
     @property
     def identity(self) -> Hashable:
-        """The file's place, or GDAL's name."""
+        """Location of the file, or GDAL's name."""
         return identity(self._path)
 
     @contextlib.contextmanager
@@ -88,7 +88,7 @@ class FileHandles:
 
 
 class OpenDataset:
-    """A dataset that the caller has opened, and will close; its threads take turns."""
+    """A dataset that the caller opened and will close; threads take turns with it."""
 
     def __init__(self, dataset: Any) -> None:
         self._dataset = dataset
@@ -96,12 +96,12 @@ class OpenDataset:
 
     @property
     def identity(self) -> Hashable:
-        """The file's place, also where another handle reads it."""
+        """Location of the file, the same as for other handles of it."""
         return identity(self._dataset.name)
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
-        """Lend the dataset, after others are done with it."""
+        """Lend the dataset, once no other thread uses it."""
         with _reading(self._dataset.name), self._lock:
             if self._dataset.closed:
                 raise RasterOpenError(f"the dataset is closed: {self._dataset.name}")
@@ -143,9 +143,9 @@ class ArrayHandles:
 def read_by(
     source: RasterSource, handles: Handles, band: BandInfo, grid: Grid | None = None
 ) -> RasterSource:
-    """Return a raster of a single band that other handles read; the rest is stated as before.
+    """Return a raster of a single band, read by other handles, with its other metadata unchanged.
 
-    The raster's own overviews show none of it.
+    The raster's own overviews do not apply to it.
     """
     return replace(
         source,
@@ -163,7 +163,7 @@ def read_by(
 def _reading(name: str) -> Iterator[None]:
     try:
         yield
-    # Not all of them are RasterioErrors: neither are GDAL's own, nor CRSError.
+    # Not all errors of rasterio are RasterioErrors: GDAL's own and CRSError are not.
     except UnicodeDecodeError as error:
         raise RasterOpenError(f"cannot read {name}: what it states is no UTF-8") from error
     except Exception as error:

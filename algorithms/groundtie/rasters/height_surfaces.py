@@ -1,4 +1,4 @@
-"""Values of a raster of heights at positions of its own, interpolated bilinearly."""
+"""Bilinear interpolation of height rasters at arbitrary positions, with voids filled."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from .kernels import interpolate
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import are_inside, lies_inside
 
-# Pixels of the raster that are read at a time, a side.
+# Side of the blocks in which the raster is read, in pixels.
 _BLOCK = 1024
 
-# Voids are filled from the region reduced to at most so many pixels a side.
+# Voids are filled from the region reduced to at most this many pixels a side.
 _FILL_SIDE = 512
 
-# So far around a region its raster is read for filling voids, in pixels.
+# Margin around a region that is read for filling voids, in pixels.
 _AROUND_PX = 2
 
-# Steps by which voids are relaxed at each size.
+# Relaxation steps of voids at each size.
 _RELAXATIONS = 300
 
-# No place of the Earth is lower or higher, in metres: such values are voids that nobody declared.
+# No place on Earth is lower or higher, in metres: other values are undeclared voids.
 _LOWEST_M, _HIGHEST_M = -600.0, 9_200.0
 
-# The outer pixels' values hold as far as these pixels reach.
+# The outermost pixels' values hold out to the edges of these pixels.
 _HALF_PX = 0.5 + POSITION_ERROR_PX
 
 
@@ -45,17 +45,17 @@ class RasterSurface:
     source
         The raster, open; its first band holds the values.
     to_px
-        From positions, of whatever CRS is asked for, to its pixels, shapes (n, 2).
+        From query positions, in any CRS, to the raster's pixels, shapes (n, 2).
     region
-        The pixels that are asked for.
+        The pixels in question.
     filled
-        The region, reduced, without voids, for those of the raster.
+        The region, reduced and with its voids filled; its values fill the voids of the raster.
     valid
-        Which of these pixels hold values of the raster.
+        Which of the reduced pixels hold values of the raster.
     known
-        Which are in no void that stays one.
+        Which of the reduced pixels are not in a void left unfilled.
     margin_px
-        How far beyond the outer pixels' centres their values hold.
+        Distance beyond the outermost pixels' centres at which their values still hold.
     """
 
     source: RasterSource
@@ -76,14 +76,14 @@ class RasterSurface:
         return values
 
     def is_measured(self, positions: FloatArray) -> Mask:
-        """Return which positions, (n, 2), lie on values of the raster, to reduced pixels."""
+        """Return which positions, (n, 2), lie on values of the raster, to a reduced pixel."""
         measured = np.isfinite(self.at(positions))
         col, row = np.rint(self.to_px(positions[measured])).T
         measured[measured] = self.valid[self._nearest(*self._reduced(col, row))]
         return measured
 
     def piece(self, px: FloatArray) -> SurfacePiece:
-        """Return the part of the surface that some of its pixel positions, (n, 2), need."""
+        """Return the part of the surface needed for pixel positions, (n, 2)."""
         size = np.array(self.source.grid.size)
         low = np.clip(np.floor(px.min(axis=0)), 0, size - 1).astype(int)
         high = np.clip(np.floor(px.max(axis=0)) + 1, 0, size - 1).astype(int)
@@ -101,7 +101,7 @@ class RasterSurface:
         return values
 
     def _reduced(self, cols: NDArray[Any], rows: NDArray[Any]) -> tuple[FloatArray, FloatArray]:
-        """Return where pixels of the raster lie among the reduced ones: columns and rows."""
+        """Return the columns and rows of the raster's pixels in the reduced region."""
         height, width = self.filled.shape
         x = (cols - self.region.col + 0.5) * width / self.region.width - 0.5
         y = (rows - self.region.row + 0.5) * height / self.region.height - 0.5
@@ -119,11 +119,11 @@ class SurfacePiece:
     Parameters
     ----------
     image
-        Its values; NaN in voids that stay.
+        Values of the surface; NaN in voids left unfilled.
     corner
-        Column and row of the raster where it begins, shape (2,).
+        Column and row of the raster at which the part begins, shape (2,).
     margin_px
-        As `RasterSurface` has it.
+        See `RasterSurface`.
     """
 
     image: FloatImage
@@ -136,7 +136,7 @@ class SurfacePiece:
         if are_inside(px, self.image.shape, 0):
             return interpolate(self.image, px, "bilinear").reshape(place.shape[1:])
         height, width = self.image.shape
-        # So that NaN is outside, too.
+        # NaN is outside, too.
         on_it = lies_inside(px, width, height, -self.margin_px)
         last = np.array([width, height])[:, None, None] - 1
         values = interpolate(self.image, np.where(on_it, np.clip(px, 0, last), 0), "bilinear")
@@ -145,7 +145,7 @@ class SurfacePiece:
 
 
 def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
-    """Return which positions, of (n, 2), lie in one block of the raster each; none is NaN."""
+    """Return the indices of positions, (n, 2), grouped by blocks of the raster, without NaN."""
     known = np.flatnonzero(np.isfinite(px[:, 0] + px[:, 1]))
     if not len(known) or np.ptp(px[known], axis=0).max() < 2 * _BLOCK:
         return [known] if len(known) else []
@@ -158,7 +158,7 @@ def read_heights(
 ) -> tuple[FloatImage, Mask]:
     """Return heights in metres and which of them are valid, as `RasterSource.read`.
 
-    Voids that nobody declared take no part in means either, so that no overviews are read.
+    Overviews are not read, as their means include undeclared voids.
     """
     if out_shape is not None:
         return average_window(read_heights, source, source, window, out_shape)
@@ -177,24 +177,24 @@ def surface_around(
     source
         The raster.
     to_px
-        From positions to its pixels, shapes (n, 2); NaN where they have none.
+        From positions to the raster's pixels, shapes (n, 2); NaN for positions off the raster.
     region
-        Positions of the region, (n, 2): those in between are asked for, too.
+        Positions of the region, (n, 2); positions between them belong to it, too.
     fill_open
-        Fill voids that are open to the region's edge, too: what lies beyond goes on as their rims.
+        Also fill voids that are open to the region's edge, by continuing their rims.
 
     Raises
     ------
     NoOverlapError
-        No place of the region lies on it.
+        No position of the region lies on the raster.
     RasterContentError
-        It holds no value there.
+        The raster holds no value in the region.
     """
     size = np.array(source.grid.size)
     px = finite(to_px(region))
     if not len(px):
         raise NoOverlapError(f"{source.path} does not cover the image")
-    # Where the image sees nothing of the raster, its pixels may be any number.
+    # Positions far off the raster may have any pixel coordinates.
     px = np.clip(px, -_AROUND_PX - 1, size + _AROUND_PX)
     low = np.clip(np.floor(px.min(axis=0)).astype(int) - _AROUND_PX, 0, size)
     high = np.clip(np.ceil(px.max(axis=0)).astype(int) + _AROUND_PX + 1, 0, size)
@@ -218,10 +218,10 @@ def _are_enclosed(valid: Mask) -> Mask:
 
 
 def fill_voids(values: FloatImage, valid: Mask) -> FloatImage:
-    """Return values, shape (h, w), in which a membrane through their rims spans the voids.
+    """Return values, shape (h, w), whose voids are spanned by a membrane through their rims.
 
-    From coarse to fine: voids take what a raster of half the size has there, and are relaxed, so
-    that each pixel becomes the mean of its neighbours. A slope goes on through a void.
+    Coarse to fine: voids start from the filled raster of half the size, and are relaxed until each
+    pixel is the mean of its neighbours. A slope continues through a void.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Heights in metres, of rasters whose values are scaled, or in another unit."""
+"""Conversion of heights to metres, for rasters with a scale, offset or another unit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .reading import FloatImage, RasterSource
 _FOOT_M = 0.3048
 _SURVEY_FOOT_M = 1200 / 3937
 
-# By their names, without case, and with nothing but letters.
+# By name, in lower case and letters only.
 _UNITS_M = {
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 0.01),
@@ -31,19 +31,19 @@ _UNITS_M = {
     },
 }
 
-# The unit of a vertical CRS, in WKT 1 or 2, follows its datum, which has none.
+# The unit of a vertical CRS, in WKT 1 or 2, follows its datum, which has no unit.
 _VERTICAL_UNIT = re.compile(
     r'VERT(?:_CS|CRS)\[.*?UNIT\["[^"]*",\s*(\d[\d.eE+-]*)', re.DOTALL | re.IGNORECASE
 )
 
 
 def in_metres(values: FloatImage, source: RasterSource, band: int = 1) -> FloatImage:
-    """Return heights in metres, given the values of a band as they are stored.
+    """Return heights in metres from the stored values of a band.
 
     Raises
     ------
     RasterContentError
-        The unit that the band names is not known.
+        The band's unit is unknown.
     """
     stated = source.bands[band - 1]
     unit_m = _unit_m(stated.unit, source)

@@ -1,4 +1,4 @@
-"""Grey images held in memory, for steps that read them again and again."""
+"""Grey images held in memory, for steps that read them repeatedly."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from .tiling import tiles
 from .warping import reduction
 from .windows import Window
 
-# Of an image of which a level shows less than this share, parts are read as they are needed.
+# If a level shows less than this share of an image, its parts are read as needed instead.
 _SHOWN_SHARE = 0.5
 
 
 def held_grey(source: RasterSource, band: int | None = None) -> RasterSource:
-    """Return a raster that reads the same grey values and validity as another one, from memory.
+    """Return a raster held in memory, with the grey values and validity of another raster.
 
     Parameters
     ----------
     source
         The raster.
     band
-        Number of its band, from 1; None: the mean of all bands but alpha.
+        Number of the band, from 1; None: the mean of all bands but alpha.
     """
     return _held(source, source.grid, *source.read(source.window, band))
 
 
 def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) -> Image:
-    """Return an image that reads the same onto parts of a grid as another one, from memory.
+    """Return an image held in memory that reads the same as another on parts of a grid.
 
     Parameters
     ----------
     image
         The image.
     grid
-        The grid, which becomes that of the image's own pixels.
+        The grid, which becomes the grid of the held image.
     to_px
         Takes the grid's map positions to pixels of the image.
     context
@@ -71,14 +71,14 @@ def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) 
 
 
 def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
-    """Return a pair that reads the same onto parts of a coarse level, from means held in memory.
+    """Return a pair that reads the same on parts of a coarse level, from means held in memory.
 
     Parameters
     ----------
     pair
         The images, which are read once.
     level
-        A grid with larger pixels. The input may be read as far off as it may be shifted.
+        A grid with larger pixels. The input may be read at any shift within the search limits.
     context
         Threads and progress.
     """
@@ -91,12 +91,12 @@ def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
 
 
 def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) -> Image:
-    """Return an image of the means that `sample` takes first: it starts at multiples of them."""
+    """Return an image of the means that `sample` takes first, over the same blocks of pixels."""
     source = image.source
     x, y = reduction(level, to_px, source.grid.size)
     width, height = -(-source.grid.width // x), -(-source.grid.height // y)
     is_shown = width * height * _SHOWN_SHARE <= level.width * level.height
-    # Sensor models count in their own pixels.
+    # A sensor model refers to its own pixels, so that its image cannot be averaged.
     if (x, y) == (1, 1) or not is_shown or type(source.grid) is not Grid:
         return image
     larger = compose(source.grid.transform, Affine.scale(x, y))
@@ -114,8 +114,8 @@ def _means(image: Image, level: Grid, to_px: PointFunction, context: Context) ->
 
 
 def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> RasterSource:
-    """Return a raster of values in memory, which are lost where they are not valid."""
+    """Return a raster of values in memory; invalid values are overwritten."""
     values[~valid] = np.nan
-    # Whoever states nothing of what is valid must not seem to.
+    # A raster without any declaration of validity must not seem to have one.
     nodata = float("nan") if source.says_what_is_valid else None
     return read_by(source, ArrayHandles(Raster(values)), BandInfo.plain("float32", nodata), grid)

@@ -1,10 +1,10 @@
-"""Hidden files of runs, and which of them a run left behind that is no longer alive.
+"""Hidden files of runs, and the removal of those that dead runs left behind.
 
-A run holds a lock (`flock`) on one hidden file of each folder in which it writes; the names of its
-other hidden files carry the same token. The kernel gives a lock up when its process ends, however
-that ends: unlike a process's number it is never that of somebody else later, and it holds between
-containers that share a disk, and between computers where the network's disk passes locks on, as NFS
-does. Where a disk knows no locks the dead cannot be told from the living: nothing is removed there.
+A run holds a lock (`flock`) on one hidden file of each folder in which it writes. The names of its
+other hidden files carry the same token. The kernel releases a lock when its process ends, for any
+reason. Unlike a process number, a lock is never reused. It works between containers that share a
+disk, and between computers if the network disk passes locks on, as NFS does. On a disk without
+locks, dead and living runs cannot be distinguished, and nothing is removed.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _LOCK = re.compile(r"\.groundtie-([0-9a-f]{16})\.lock")
 
 
 def new_token() -> str:
-    """Return what the names of a run's hidden files have in common, and no other run's have."""
+    """Return a token that is common to the names of a run's hidden files, and unique to the run."""
     return secrets.token_hex(8)
 
 
 def hidden_name(token: str, role: str, stem: str, suffix: str = "") -> str:
-    """Return the name of a run's hidden file; `stem` and `suffix` are the final name's."""
+    """Return the name of a run's hidden file, given stem and suffix of the final name."""
     return f".{stem}.groundtie-{token}-{role}{suffix}"
 
 
@@ -41,19 +41,19 @@ def final_name(path: str | os.PathLike[str]) -> str:
 
 
 class Claim:
-    """Keeps other runs from removing the hidden files of this one from a folder.
+    """A lock that keeps other runs from removing this run's hidden files from a folder.
 
     Parameters
     ----------
     folder
-        Where the files are. Leftovers of dead runs are removed from it first.
+        Folder of the files. Leftovers of dead runs are removed from it first.
     token
-        What their names have in common.
+        Token in the names of the files.
 
     Raises
     ------
     OSError
-        Nothing can be written to the folder.
+        The folder cannot be written to.
     """
 
     def __init__(self, folder: Path, token: str) -> None:
@@ -62,16 +62,16 @@ class Claim:
         self._file = _locked(self._path)
 
     def close(self) -> None:
-        """Remove the lock: there are no hidden files any more."""
+        """Remove the lock, when there are no hidden files left."""
         if sys.platform == "win32":
-            self._file.close()  # Windows removes no file that is open
+            self._file.close()  # Windows cannot remove an open file
         with contextlib.suppress(OSError):
             self._path.unlink()
         self._file.close()
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove hidden files and folders of runs that died; what cannot be removed stays."""
+    """Remove hidden files and folders of dead runs, as far as possible."""
     with contextlib.suppress(OSError):
         for name in os.listdir(folder):
             found = _LOCK.fullmatch(name)
@@ -80,8 +80,8 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, or a folder with all that it holds, if it is there and can be removed."""
-    # A file that is still open elsewhere must not hide why a job failed.
+    """Remove a file, or a folder with its contents, if it exists and can be removed."""
+    # A file still open elsewhere must not mask the error that a job failed with.
     with contextlib.suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
@@ -90,36 +90,36 @@ def remove(path: Path) -> None:
 
 
 def _locked(path: Path) -> IO[bytes]:
-    """Make a file, and lock it."""
+    """Make a file and lock it."""
     while True:
         file = path.open("xb")
         if sys.platform == "win32":
-            return file  # nobody can remove it while it is open
+            return file  # an open file cannot be removed
         with contextlib.suppress(OSError):  # a disk without locks
             fcntl.flock(file, fcntl.LOCK_EX)
         if os.fstat(file.fileno()).st_nlink:
             return file
-        file.close()  # another run took it for a dead one's, before it was locked
+        file.close()  # before it was locked, another run removed it as a dead run's
 
 
 def _remove_if_dead(folder: Path, lock: str, token: str) -> None:
     with contextlib.suppress(OSError):
         if sys.platform == "win32":
-            (folder / lock).unlink()  # fails while its run has it open
+            (folder / lock).unlink()  # fails while the run has it open
             _remove_all(folder, token)
             return
         with _opened(folder / lock) as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while its run lives
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while the run is alive
             _remove_all(folder, token)
-            # Last: who dies before leaves it to the next one.
+            # Last, so that the next run continues if this one dies before.
             (folder / lock).unlink()
 
 
 def _opened(path: Path) -> IO[bytes]:
-    """Open a lock of another run; NFS locks exclusively only what is open for writing."""
+    """Open a lock of another run, for writing, as NFS requires for exclusive locks."""
     try:
         return path.open("r+b")
-    except PermissionError:  # of somebody else: other disks lock it, too
+    except PermissionError:  # of another user; other disks can lock it open for reading
         return path.open("rb")
 
 

@@ -1,8 +1,8 @@
 """Interpolation by a kernel, exact at any position, and the weights of B-splines.
 
-OpenCV's `remap` is only used for what it does exactly, since OpenCV 5: bilinear interpolation in
-single precision. Before, it rounded positions to 1/32 px; its cubic kernel (a = -0.75) does not
-reproduce a ramp, which moves the image by up to 0.05 px.
+OpenCV's `remap` is used only where it is exact: bilinear interpolation in single precision, since
+OpenCV 5. Older versions round positions to 1/32 px. Its cubic kernel (a = -0.75) does not reproduce
+a ramp, which moves the image by up to 0.05 px.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Weights = Callable[[NDArray[Any]], list[NDArray[Any]]]
 _REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
 _REMAP_SIDE = 1 << 15
 
-# Pixels that are worked at a time: what they need stays in the processor's cache.
+# Pixels processed at a time, few enough for their working set to stay in the processor's cache.
 CACHED_PIXELS = 1 << 15
 
 
@@ -41,12 +41,12 @@ def _cubic(s: NDArray[Any]) -> list[NDArray[Any]]:
 
 
 def _lanczos(s: NDArray[Any]) -> list[NDArray[Any]]:
-    """Sinc windowed by a sinc four times as wide, the sum made 1."""
+    """Sinc windowed by a sinc four times as wide, normalised to a sum of 1."""
     sine, slow_sine, slow_cosine = np.sin(np.pi * s), np.sin(np.pi / 4 * s), np.cos(np.pi / 4 * s)
     weights = []
     for k in range(-3, 5):
         t = s - k
-        # sin(pi t) and sin(pi t / 4) from those of s
+        # sin(pi t) and sin(pi t / 4), from the sines and cosines of s
         product = (
             (-1) ** k
             * sine
@@ -62,22 +62,23 @@ def _lanczos(s: NDArray[Any]) -> list[NDArray[Any]]:
     return [weight / total for weight in weights]
 
 
-# For the pixels at -n/2 + 1 … n/2 from the one on the left, at the fraction s of the way from it.
+# Weights of the pixels at -n/2 + 1 … n/2 from the pixel on the left, for a position a fraction s of
+# a pixel to the right of it.
 _KERNELS: dict[str, Weights] = {"bilinear": _bilinear, "cubic": _cubic, "lanczos": _lanczos}
 
-# How many pixels on each side of a position a kernel takes.
+# Number of pixels on each side of a position that a kernel uses.
 REACH = {"nearest": 1, "bilinear": 1, "cubic": 2, "lanczos": 4}
 
 
 def bspline_weights(order: int, fraction: NDArray[Any] | float) -> NDArray[np.float64]:
-    """Return the weights with which a B-spline takes the pixels around positions (de Boor 1978).
+    """Return the weights of a B-spline for the pixels around positions (de Boor 1978).
 
     Parameters
     ----------
     order
         Degree + 1: 2 is linear, 4 cubic.
     fraction
-        How far position - order / 2 lies beyond a whole number n, 0 to 1, any shape.
+        Excess of position - order / 2 over a whole number n, 0 to 1, any shape.
 
     Returns
     -------
@@ -101,7 +102,7 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
     image
         Shape (h, w) or (bands, h, w), floating-point or complex.
     px
-        Columns and rows of the positions, shape (2, m, n); they are worked in their own precision.
+        Columns and rows of the positions, shape (2, m, n), processed in their own precision.
     method
         "bilinear", "cubic" or "lanczos".
 
@@ -122,13 +123,13 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
 
 
 def _first_of_neighbours(px: NDArray[Any]) -> tuple[float, float] | None:
-    """Return the first of positions that lie side by side as pixels do, (col, row); None: no."""
+    """Return the first (col, row) of positions spaced as adjacent pixels; None for others."""
     if px.size == 0 or np.abs(px).max() > _REMAP_SIDE:
         return None
     (x, y), (rows, cols) = px, px.shape[1:]
     first = x[0, 0], y[0, 0]
     corners = x[-1, -1] - first[0], y[-1, -1] - first[1]
-    # The last position settles it mostly.
+    # The last position decides in most cases.
     if corners != (cols - 1, rows - 1):
         return None
     along_x, along_y = (np.arange(n, dtype=px.dtype) for n in (cols, rows))
@@ -145,9 +146,9 @@ def _by_filter(
     kernel: Weights,
     reach: int,
 ) -> NDArray[Any]:
-    """Return `_by_kernel` of positions, as many as `size`, that lie side by side from `first` on.
+    """Return `_by_kernel` for `size` positions spaced as adjacent pixels, from `first` on.
 
-    All have the same weights, so that the kernel is a filter of the image.
+    All positions have the same weights, so that the kernel is a filter of the image.
     """
     col, row = (math.floor(position) - reach + 1 for position in first)
     across, down = (kernel(np.array([position % 1])) for position in first)
@@ -165,7 +166,7 @@ def _by_filter(
         for band in needed
     ]
     filtered = np.stack(found)[:, : size[0], : size[1]]
-    # As elsewhere, what lies a pixel outside is 0, though the kernel reaches farther.
+    # As in `_by_kernel`, positions more than a pixel outside are 0, though the kernel reaches them.
     x, y = (start + np.arange(n) for start, n in zip(first, size[::-1], strict=True))
     filtered[:, (y < -1) | (y > bands.shape[1])] = 0
     filtered[:, :, (x < -1) | (x > bands.shape[2])] = 0
@@ -175,7 +176,7 @@ def _by_filter(
 def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int) -> NDArray[Any]:
     """Return the sums of weighted pixels, shape (bands, m, n); all bands have the same weights."""
     count, height, width = bands.shape
-    # Positions up to a pixel outside, with all that their kernels take.
+    # Padded for positions up to a pixel outside, with all pixels of their kernels.
     padded = np.zeros((count, height + 2 * reach + 1, width + 2 * reach + 1), bands.dtype)
     padded[:, reach : reach + height, reach : reach + width] = bands
     images, stride = padded.reshape(count, -1), padded.shape[2]
@@ -202,12 +203,12 @@ def _add_weighted(
     down: list[NDArray[Any]],
     total: NDArray[Any],
 ) -> None:
-    """Put into `total` the weighted sums of the pixels from `corner` on, in rows of `stride`."""
+    """Write the weighted sums of the pixels from `corner` on, in rows of `stride`, to `total`."""
     line, value = np.empty((2, len(corner)), flat.dtype)
     for j, weight in enumerate(down):
         for i, share in enumerate(across):
             into = value if i else line
-            # Clipping, for which there is no need, is faster than a check.
+            # Clipping is never needed here, but faster than a check.
             flat[j * stride + i :].take(corner, out=into, mode="clip")
             into *= share
             if i:
@@ -226,7 +227,7 @@ def _is_for_remap(image: NDArray[Any], px: NDArray[Any]) -> bool:
 
 
 def _split(x: NDArray[Any], size: int) -> tuple[NDArray[np.intp], NDArray[Any]]:
-    """Return the pixels left of positions along an axis, and how far right of them they lie."""
+    """Return the pixels left of positions along an axis, and the positions' distances from them."""
     if x.min() < -1 or x.max() > size:
         x = np.clip(x, -1, size)
     left = np.floor(x)

@@ -20,21 +20,21 @@ from .windows import Window
 
 _FIRST_STEP = 64
 
-# Pixel positions between the nodes of a lattice may be wrong by this much.
+# Largest error of pixel positions interpolated between the nodes of a lattice.
 _TOLERANCE_PX = 0.005
 
-# Positions nearer than this to pixels lie on them: map coordinates have no more digits.
+# Positions nearer than this to a pixel centre lie on it: map coordinates have no more digits.
 ON_PIXELS = 1e-6
 
-# Stands for positions that are not finite: outside of every image.
+# Replaces positions that are not finite: outside of every image.
 NOWHERE = -1e9
 
 
 @runtime_checkable
 class DenseMap(Protocol):
-    """A map from a grid to input pixels with a way of its own to find them for all of its pixels.
+    """A map from a grid to input pixels that evaluates all pixels of a grid by its own method.
 
-    It need not be smooth: terrain, for one, may have steps anywhere.
+    It need not be smooth: terrain, for example, may have steps anywhere.
     """
 
     def __call__(self, xy: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ class DenseMap(Protocol):
 
 @dataclass(frozen=True)
 class Lattice:
-    """Values at the centres of cells of step × step pixels, one cell beyond a grid each way.
+    """Values at the centres of cells of step × step pixels, one cell beyond the grid each way.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class Lattice:
     values: NDArray[Any]
 
     def minus(self, origin: FloatArray) -> Lattice:
-        """Return what is left of the values, in single precision, when `origin`, (k,), is taken."""
+        """Return the values minus `origin`, (k,), in single precision."""
         left = self.values - np.reshape(origin, (-1, 1, 1))
         return replace(self, values=left.astype(np.float32))
 
     def bounds(self) -> NDArray[Any]:
-        """Return the least and largest values at pixels, shape (2, k); NaN if not all are known."""
+        """Return the smallest and largest values at pixels, shape (2, k); NaN if any is unknown."""
         rows, cols = (
             np.unique(np.clip((np.arange(-1, nodes - 1) + 0.5) * self.step - 0.5, 0, side - 1))
             for nodes, side in zip(
@@ -83,15 +83,15 @@ class Lattice:
         """Return the values at all pixels of some rows, shape (k, rows, width)."""
         nodes = self._lines[:, rows]
         count, height, width = nodes.shape
-        # Resizing takes nodes for centres of cells, as they are.
+        # Resizing takes nodes as the centres of cells, as they are.
         whole = cv2.resize(nodes.reshape(-1, width), (width * self.step, count * height))
         within = slice(self.step, self.step + self.grid.width)
         return np.asarray(whole.reshape(count, height, -1)[..., within])
 
     def coordinates(self) -> FloatArray:
-        """Return the values, if they are pixel positions, at all pixels: (2, height, width).
+        """Return the values, which must be pixel positions, at all pixels: (2, height, width).
 
-        Those that are not known become `NOWHERE`.
+        Unknown values become `NOWHERE`.
         """
         px = np.empty((2, self.grid.height, self.grid.width))
         for rows in row_strips(self.grid.height, self.grid.width):
@@ -101,9 +101,9 @@ class Lattice:
         return px
 
     def window(self) -> Window | None:
-        """Return the window, if values are pixel positions, on whose pixels the grid's lie.
+        """Return the window of pixels that coincide with the grid's, if values are pixel positions.
 
-        None: they lie between pixels, or are no neighbours.
+        None: the positions lie between pixels, or are not those of adjacent pixels.
         """
         rows, cols = (np.arange(n) * self.step for n in self.values.shape[1:])
         corner = self.values - np.stack(np.meshgrid(cols, rows))
@@ -114,7 +114,7 @@ class Lattice:
         return Window(int(first[0]), int(first[1]), self.grid.width, self.grid.height)
 
     def lies_within(self, width: int, height: int) -> bool:
-        """Return whether the values, pixel positions, all lie on pixels of an image of a size."""
+        """Return whether the values, as pixel positions, all lie in an image of this size."""
         low, high = self.bounds()
         return bool(np.all((low > -0.49) & (high < np.array([width, height]) - 0.51)))
 
@@ -129,14 +129,14 @@ class Lattice:
         above = place.astype(int)
         share = (place - above).astype(values.dtype)[:, None]
         mixed = values[:, above] * (1 - share) + values[:, above + 1] * share
-        # On a node, the next one does not count, even if it is not known.
+        # On a node, the next node carries no weight, even if it is unknown.
         return np.where(share > 0, mixed, values[:, above])
 
 
 def coordinates(grid: Grid, to_input_px: PointFunction) -> FloatArray:
     """Return the input column and row of every pixel of a grid, shape (2, height, width).
 
-    Good to 0.01 px; positions that are not finite become far outside. `to_input_px` takes map
+    Accurate to 0.01 px; positions that are not finite become `NOWHERE`. `to_input_px` takes map
     positions of the grid, shape (n, 2), to input pixels (col, row), shape (n, 2).
     """
     if isinstance(to_input_px, DenseMap):
@@ -145,28 +145,28 @@ def coordinates(grid: Grid, to_input_px: PointFunction) -> FloatArray:
 
 
 def row_strips(height: int, width: int) -> Iterator[slice]:
-    """Return the rows of an array in parts that are worked in the processor's cache."""
+    """Yield the rows of an array in parts that fit into the processor's cache."""
     lines = max(CACHED_PIXELS // width, 1)
     for first in range(0, height, lines):
         yield slice(first, min(first + lines, height))
 
 
 def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_PX) -> Lattice:
-    """Evaluate a function at a lattice that is halved until it is right halfway between nodes.
+    """Evaluate a function on a lattice, refined until it interpolates well midway between nodes.
 
     Parameters
     ----------
     grid
         The pixels.
     function
-        Smooth; mostly it takes map positions to input pixels, shapes (n, 2). Values that are not
-        finite become NaN. It is asked up to a cell beyond the grid.
+        A smooth function, mostly from map positions to input pixels, shapes (n, 2). Values that are
+        not finite become NaN. It is evaluated up to a cell beyond the grid.
     tolerance
         Largest error.
     """
     step = _FIRST_STEP
     while step > 1:
-        # With what lies halfway between nodes, in rows, columns and both.
+        # Also evaluated halfway between nodes, along rows, columns and both.
         finer = _evaluate(grid, function, step, 2)
         nodes, halfway = finer[:, ::2, ::2], finer[:, 1::2]
         rows, cols = nodes[:, :-1] + nodes[:, 1:], nodes[..., :-1] + nodes[..., 1:]
@@ -182,7 +182,7 @@ def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_P
 
 
 def _evaluate(grid: Grid, function: PointFunction, step: int, parts: int) -> FloatArray:
-    """Return a function at the nodes of a lattice, and in parts between, shape (k, rows, cols)."""
+    """Return a function's values, (k, rows, cols), at `parts` places per step of a lattice."""
     rows, cols = (
         np.arange(-parts, parts * -(-side // step) + 1) * (step / parts) + (step - 1) / 2
         for side in (grid.height, grid.width)

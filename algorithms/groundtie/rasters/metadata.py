@@ -1,4 +1,4 @@
-"""What a raster states of itself: its grid, its bands, and the types of their pixels."""
+"""Metadata of a raster: its grid, its bands, and the types of their pixels."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from .grid import PIXEL_COORDINATES, Grid, is_invertible, require_map
 
 T = TypeVar("T")
 
-# Ten years of daily images are 3653 bands. Each band costs calls of GDAL, which one file of 14 kB
-# can ask for 65,535 times.
+# Ten years of daily images are 3653 bands. Each band costs calls of GDAL, and a file of 14 kB can
+# declare 65,535 bands.
 MOST_BANDS = 4096
 
-# Also as the unit of something: "sigma0_db".
+# Also within a name, as in "sigma0_db".
 _DECIBEL = re.compile(r"(?<![a-z])(db|decibels?)(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class BandInfo:
-    """What a raster states of one of its bands."""
+    """Metadata of a band."""
 
     dtype: str
     nodata: float | None
@@ -40,18 +40,18 @@ class BandInfo:
 
     @classmethod
     def plain(cls, dtype: str, nodata: float | None = None) -> BandInfo:
-        """Return a grey band of which nothing else is stated."""
+        """Return a grey band without further metadata."""
         return cls(dtype, nodata, ColorInterp.gray, None, None, 1.0, 0.0, {})
 
     @property
     def is_in_decibels(self) -> bool:
-        """Whether its unit states so."""
+        """Whether the unit contains decibels."""
         return self.unit is not None and _DECIBEL.search(self.unit) is not None
 
     @classmethod
     def all_of(cls, dataset: Any) -> tuple[BandInfo, ...]:
-        """Return what a rasterio dataset states of each of its bands."""
-        # Each of these properties asks all bands, so none is asked for one band.
+        """Return the metadata of each band of a rasterio dataset."""
+        # Each of these properties queries all bands, so that a query by band would be quadratic.
         columns = (
             stated(lambda: dataset.dtypes),
             stated(lambda: dataset.nodatavals),
@@ -66,16 +66,16 @@ class BandInfo:
 
 
 def numpy_dtype(name: str) -> np.dtype[Any]:
-    """Return the type that holds the pixels of a band, given rasterio's name of theirs."""
+    """Return the type that holds the pixels of a band, from rasterio's name of its type."""
     # GDAL has complex integers; numpy has none.
     return np.dtype({"complex_int16": "complex64", "complex_int32": "complex128"}.get(name, name))
 
 
 def stated(read: Callable[[], T]) -> T:
-    """Return what a rasterio dataset states, in spite of what GDAL has warned of before.
+    """Return a property of a rasterio dataset in spite of earlier warnings of GDAL.
 
-    rasterio takes any older message of GDAL's, such as on an odd tag, for a failure of some of its
-    properties, and forgets the message then.
+    For some properties, rasterio takes any earlier message of GDAL, such as on an odd tag, for a
+    failure, and clears the message. The second attempt then succeeds.
     """
     try:
         return read()
@@ -86,9 +86,9 @@ def stated(read: Callable[[], T]) -> T:
 
 
 def has_own_mask(flags: Collection[MaskFlags], nodata: float | None) -> bool:
-    """Return whether only its own mask states which pixels of a band are valid.
+    """Return whether only a mask of its own marks the valid pixels of a band.
 
-    For rasterio, nodata values that double precision rounds out of the range of 64 bits are none.
+    rasterio drops nodata values that double precision rounds out of the range of 64 bits.
     """
     return not flags or (set(flags) == {MaskFlags.nodata} and nodata is None)
 
@@ -96,7 +96,7 @@ def has_own_mask(flags: Collection[MaskFlags], nodata: float | None) -> bool:
 def tags_of(dataset: Any, **which: Any) -> dict[str, str]:
     """Return the tags of a domain (`ns`) or band (`bidx`) of a rasterio dataset.
 
-    Empty where they are no UTF-8: then nobody can read them.
+    Empty if they are not UTF-8 and thus unreadable.
     """
     try:
         return dict(stated(lambda: dataset.tags(**which)))
@@ -112,7 +112,7 @@ def colormap(dataset: Any) -> dict[int, tuple[int, ...]] | None:
 
 
 def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Return the floating-point or complex type in which values of `dtype` are computed with."""
+    """Return the floating-point or complex type for computations with values of `dtype`."""
     if dtype.kind == "c":
         return dtype
     exact_in_float32 = dtype.itemsize <= 2 or dtype == np.float32
@@ -120,13 +120,13 @@ def working_dtype(dtype: np.dtype[Any]) -> np.dtype[Any]:
 
 
 def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return floating-point values, which are lost, in another type."""
+    """Return floating-point values in another type; the argument may be overwritten."""
     if dtype.kind in "fc" or values.dtype == dtype:
         return values.astype(dtype, copy=False)
     limits = np.iinfo(dtype)
     np.rint(values, out=values)
     highest = values.dtype.type(limits.max)
-    if int(highest) > limits.max:  # rounded up to a number that the other type would wrap
+    if int(highest) > limits.max:  # rounded up beyond the range of the other type
         highest = np.nextafter(highest, values.dtype.type(0))
     return np.clip(values, limits.min, highest, out=values).astype(dtype)
 
@@ -147,20 +147,21 @@ def grid_of(name: str, dataset: Any, *, allow_sensor_geometry: bool) -> Grid:
     Parameters
     ----------
     name
-        What messages call it.
+        Name in messages.
     dataset
         The dataset, open.
     allow_sensor_geometry
-        Take images that are located by RPCs or GCPs only, in pixel coordinates.
+        Accept images located by RPCs or GCPs only, in pixel coordinates.
 
     Raises
     ------
     GeoreferencingError
-        The image is located by RPCs or GCPs only, its pixels have no size, or its CRS is no map's.
+        The image is located by RPCs or GCPs only, its pixels have no size, or its CRS is not that
+        of a map.
     """
     crs, transform = stated(lambda: dataset.crs), dataset.transform
     if transform.is_identity:
-        # rasterio has this for none. Without one, a CRS locates nothing.
+        # rasterio's value for a missing geotransform, without which a CRS locates nothing.
         if not allow_sensor_geometry:
             _refuse_sensor_geometry(name, dataset)
         crs, transform = None, PIXEL_COORDINATES

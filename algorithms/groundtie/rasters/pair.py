@@ -24,16 +24,16 @@ from .raster_masks import kept_on
 from .reading import FloatImage, Mask, RasterSource, Window
 from .warping import reduction, sample, sample_bands
 
-# Rotated images are tried at angles this far apart for what they reach.
+# The reach of rotated images is determined at angles this far apart.
 _ANGLE_STEP_DEG = 5.0
 
-# Fewer bands make no colour.
+# Fewest bands for classes of colour.
 _LEAST_BANDS = 3
 
-# For pairs that are not searched.
+# For pairs without a search.
 _NOWHERE = SearchLimits(0.0)
 
-# Pixel sizes nearer than this are the same.
+# Pixel sizes with a smaller relative difference are equal.
 _SAME_SIZE = 0.02
 
 
@@ -48,17 +48,17 @@ class Image:
     band
         Number of the band, from 1; None: the mean of all bands.
     mask
-        A raster on the same map whose pixels state which of the image's take part: those with 0
-        or without data do not. None: all that are valid.
+        A raster on the same map. Image pixels at which it is 0 or has no data do not take part.
+        None: all valid pixels take part.
     mask_span
-        Columns and rows of the mask that take part together only: those that a matching pixel
-        spans (see `masked`).
+        Columns and rows of the mask that a matching pixel spans: all must take part for the
+        matching pixel to do so (see `masked`).
     mask_note
-        What a user should know of the mask.
+        Note on the mask for the user.
     mask_hides
-        Whether it hides clouds and the like, and states nothing of the ground.
+        Whether the mask only hides clouds and the like, without information on the ground.
     colours
-        Whose classes are read in place of grey values; None: grey values are.
+        Classes of colour to read in place of grey values; None: grey values.
     """
 
     source: RasterSource
@@ -71,7 +71,7 @@ class Image:
 
     @property
     def has_colours(self) -> bool:
-        """Whether its bands make classes of colour: nobody chose one, and there are enough."""
+        """Whether classes of colour can be formed: no band was chosen, and there are enough."""
         return self.band is None and len(self.source.image_bands) >= _LEAST_BANDS
 
     def values_onto(self, grid: Grid, to_px: PointFunction) -> tuple[FloatImage, Mask]:
@@ -85,7 +85,7 @@ class Image:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = self.values_onto(grid, to_px)
         if hidden is not None:
-            # Before anything is inferred from the values: nothing may be inferred from these.
+            # First of all: nothing may be inferred from hidden values.
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
             valid = valid & ~empty_areas(values, valid)
@@ -94,16 +94,16 @@ class Image:
         return Patch(values, valid)
 
     def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:
-        """Return what the mask, which there must be, lets take part; parameters as `read_onto`."""
+        """Return the pixels that the mask, which must exist, keeps; parameters as `read_onto`."""
         assert self.mask is not None
         to_mask = _to_mask_px(self.source, self.mask, to_px)
         return kept_on(self.mask, grid, to_mask, lambda shown: shown != 0, self.mask_span)
 
     def masked(self, mask: RasterSource, matching: Grid) -> Image:
-        """Return the image with a mask, whose pixels may be smaller than those of matching.
+        """Return the image with a mask, whose pixels may be smaller than matching pixels.
 
-        No matching pixel takes part of which the mask hides a part, however narrow: also on
-        coarser levels, whose pixels are as those of matching at their centres.
+        A matching pixel does not take part if the mask hides any part of it, however narrow. On
+        coarser levels, the matching pixel at a pixel's centre decides.
         """
         to_px = matching.to_pixels_of(self.source.grid)
         span = reduction(matching, _to_mask_px(self.source, mask, to_px), mask.grid.size)
@@ -111,21 +111,21 @@ class Image:
         return self if is_so else replace(self, mask=mask, mask_span=span)
 
     def bands_onto(self, grid: Grid, to_px: PointFunction) -> FloatImage:
-        """Return all bands but alpha on a grid, shape (bands, h, w), 0 where one is invalid."""
+        """Return all bands but alpha on a grid, shape (bands, h, w), 0 where any is invalid."""
         return sample_bands(self.source, grid, to_px)[0]
 
 
 def require_content(image: Image, patch: Patch, read: Callable[[Image], Patch], where: str) -> None:
-    """Raise `RasterContentError` if a piece of an image shows nothing; it names a mask's doing.
+    """Raise `RasterContentError` if a piece of an image has no content, and say if a mask hides it.
 
     Parameters
     ----------
     image, patch
         The image, and the piece.
     read
-        Returns the same piece of another image: of this one without its mask.
+        Reads the same piece of an image; called with this image without its mask.
     where
-        What the message calls the piece.
+        Name of the piece in messages.
     """
     if not patch.is_flat:
         return
@@ -142,28 +142,28 @@ def require_content(image: Image, patch: Patch, read: Callable[[Image], Patch], 
 
 
 def _to_mask_px(source: RasterSource, mask: RasterSource, to_px: PointFunction) -> PointFunction:
-    """Return what takes map positions to pixels of a raster's mask, given what does to its own."""
+    """Return the function from map positions to pixels of a mask, given that to the raster's."""
     to_mask = source.grid.to_pixels_of(mask.grid)
     return lambda xy: to_mask(source.grid.pixel_to_map(to_px(xy)))
 
 
 @dataclass(frozen=True)
 class ImagePair:
-    """Reference and input on a common matching grid; reads windows of both, never whole scenes.
+    """Reference and input on a common matching grid, read by windows, never as whole scenes.
 
     Parameters
     ----------
     reference, input
         The two images.
     grid
-        The matching grid: the reference's, with pixels as large as the coarser image's,
-        where the images overlap or may do so within the search radius.
+        The matching grid: the reference's grid, with pixels as large as the coarser image's, over
+        the area where the images overlap, or may do so within the search radius.
     overlap_px
-        Width and height, in matching pixels, of the box in which they overlap nominally.
+        Width and height, in matching pixels, of the bounding box of the nominal overlap.
     surroundings
-        That grid, continued as far as either image may show something of it at its nominal place.
+        The matching grid, extended to all nominal places where either image may show a part of it.
     limits
-        How far the input may lie from its nominal place, in metres.
+        Limits of the input's displacement from its nominal place, in metres.
     """
 
     reference: Image
@@ -174,7 +174,7 @@ class ImagePair:
     limits: SearchLimits = _NOWHERE
 
     def reference_patch(self, grid: Grid, hidden: Mask | None = None) -> Patch:
-        """Return the reference on a grid in its CRS, masked where it is to be hidden."""
+        """Return the reference on a grid in its CRS, masked where `hidden`."""
         return self.reference.read_onto(grid, self.reference.source.grid.map_to_pixel, hidden)
 
     def input_patch(self, grid: Grid, to_input_px: PointFunction) -> Patch:
@@ -182,7 +182,7 @@ class ImagePair:
         return self.input.read_onto(grid, to_input_px)
 
     def exchanged(self) -> ImagePair:
-        """Return the pair with the roles of its images exchanged, searched as far."""
+        """Return the pair with the roles of its images exchanged and the same search limits."""
         limits = self.limits
         return make_pair(
             self.input,
@@ -195,17 +195,17 @@ class ImagePair:
 
     @property
     def is_masked(self) -> bool:
-        """Whether a mask limits what of an image takes part."""
+        """Whether either image has a mask."""
         return self.reference.mask is not None or self.input.mask is not None
 
     @property
     def is_ground_masked(self) -> bool:
-        """Whether a mask may state what of an image is ground."""
+        """Whether a mask may contain information on the ground (see `Image.mask_hides`)."""
         images = (self.reference, self.input)
         return any(image.mask is not None and not image.mask_hides for image in images)
 
     def notes(self) -> list[str]:
-        """Return what a user should know of how the images are read."""
+        """Return notes for the user on how the images are read."""
         images = (self.reference, self.input)
         complex_valued = [
             f"{image.source.path} is complex-valued: its amplitude is matched"
@@ -215,11 +215,11 @@ class ImagePair:
         return [*complex_valued, *(image.mask_note for image in images if image.mask_note)]
 
     def nominal_px(self, xy: FloatArray) -> FloatArray:
-        """Return the input pixels at reference map positions of its nominal place, shape (n, 2)."""
+        """Return the nominal input pixels of reference map positions, shape (n, 2)."""
         return self.grid.to_pixels_of(self.input.source.grid)(xy)
 
     def transform(self, model: Model) -> Transform:
-        """Return the transform between the images that a misregistration on the map makes."""
+        """Return the transform between the images, given the misregistration on the map."""
         return Transform(model, self.grid.crs, self.input.source.grid)
 
 
@@ -238,24 +238,23 @@ def make_pair(
     reference, input
         The two images.
     matching_pixel_size_m
-        Pixel size of the matching grid, no less than the finer image's; None: the coarser one's.
+        Pixel size of the matching grid, no less than the finer image's; None: the coarser image's.
     search_radius_m
-        How far the input may lie from its nominal place; None: as `default_radius_m`.
+        Largest distance of the input from its nominal place; None: as `default_radius_m`.
     rotation_deg, scale
-        Largest rotation, either way, and largest scale, either way, against its nominal
-        geotransform. Where they are searched for and there is no georeferencing, both images have
-        one centre.
+        Largest rotation and largest scale, either way, against the input's nominal geotransform.
+        If they are searched for without georeferencing, the images' centres are taken to coincide.
 
     Raises
     ------
     SameFileError
         Both are the same raster.
     ParameterError
-        The pixel size is smaller than that of both images, which show nothing more.
+        The pixel size is smaller than that of both images, which contain no finer detail.
     GeoreferencingError
-        Only one of them is georeferenced.
+        Only one image is georeferenced.
     NoOverlapError
-        They do not overlap, or the map of one has no place for the other.
+        The images do not overlap, or the input has no position in the reference's CRS.
     """
     ref, inp = reference.source, input.source
     if ref.is_same_as(inp):
@@ -286,7 +285,7 @@ def make_pair(
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
     if not limits.is_shift:
         outline = _rotated(outline, rotation_deg, scale)
-    # So many pixels along either side that the radius is kept along the shorter one, too.
+    # Measured in the shorter side of a pixel, so that the radius is covered along that axis, too.
     side_m = min(grid.pixel_sides_m)
     limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * side_m))
     radius_px = limits.radius / side_m
@@ -311,13 +310,13 @@ def require_georeferenced_alike(reference: RasterSource, input: RasterSource) ->
 
 
 def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:
-    """Return the shift from which on an image with an outline, (n, 2), shows nothing of a grid."""
+    """Return the shift beyond which an image with an outline, (n, 2), cannot overlap a grid."""
     low, high = _extent(outline_px)
     return float(np.hypot(*np.maximum(np.array(grid.size) - low, high)))
 
 
 def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:
-    """Return all that an outline, shape (n, 2), rotated and scaled reaches about its centre."""
+    """Return the points of an outline, shape (n, 2), rotated and scaled about its centre."""
     centre = np.add(*_extent(outline_px)) / 2
     steps = int(np.ceil(2 * largest_deg / _ANGLE_STEP_DEG)) + 1
     angles = np.radians(np.linspace(-largest_deg, largest_deg, steps))
@@ -328,9 +327,9 @@ def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -
 
 
 def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None) -> Window:
-    """Return where an image may show something of a window, as far off as it may lie.
+    """Return the nominal places at which an image may show a part of a window.
 
-    What may be rotated shows it anywhere in its nominal outline, shape (n, 2).
+    An image that may be rotated can show it anywhere in its nominal outline, shape (n, 2).
     """
     low = np.array(reach[:2]) - int(np.ceil(radius_px))
     high = np.array(reach[:2]) + reach[2:] + int(np.ceil(radius_px))
@@ -364,6 +363,6 @@ def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
 
 
 def _extent(px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the largest column and row of positions that are finite."""
+    """Return the smallest and the largest column and row of the finite positions."""
     px = finite(px)
     return px.min(axis=0), px.max(axis=0)

@@ -1,4 +1,4 @@
-"""A piece of an image: grey values and which of them count."""
+"""Patches of images: grey values and their validity."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .grid import Grid
 from .kernels import REACH
 from .windows import FloatImage, Mask, Window
 
-# Areas of zeros from this side on hold no data.
+# Areas of zeros with at least this side hold no data.
 _EMPTY_PX = 9
 
-# More negative values than this do not come from resampling, whose kernels undershoot at edges.
+# A larger share of negative values is not due to resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Grey values, float32, and which of them are valid, bool, both of shape (h, w).
+    """Grey values, float32, and their validity, bool, both of shape (h, w).
 
-    A stack of patches of one size is one, too: its arrays have the shape (n, h, w).
+    A stack of patches of one size is a patch, too, with arrays of shape (n, h, w).
     """
 
     values: FloatImage
@@ -63,7 +63,7 @@ class Patch:
 
 
 def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:
-    """Return the means over blocks; what is left over at the right and bottom is dropped."""
+    """Return the means over blocks; incomplete blocks at the right and bottom are dropped."""
     height, width = (n // factor * factor for n in image.shape)
     size = (width // factor, height // factor)
     return np.asarray(cv2.resize(image[:height, :width], size, interpolation=cv2.INTER_AREA))
@@ -72,11 +72,11 @@ def reduced(image: NDArray[Any], factor: int) -> NDArray[Any]:
 def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch:
     """Return the means of a window's valid pixels over blocks, as `reduced`.
 
-    Blocks of which a smaller share than `least_valid` is valid are masked.
+    Blocks with a smaller valid share than `least_valid` are masked.
     """
     if factor == 1:
         return window
-    # Means are rounded, counts are not: a block that is whole must be valid.
+    # Means have rounding errors, counts have none: a completely valid block must stay valid.
     count = np.rint(reduced(window.valid.astype(np.float32), factor) * factor**2)
     share = count / np.float32(factor**2)
     sums = reduced(np.where(window.valid, window.values, 0), factor)
@@ -86,17 +86,17 @@ def reduced_patch(window: Patch, factor: int, least_valid: float = 1.0) -> Patch
 def empty_areas(values: FloatImage, valid: Mask) -> Mask:
     """Return the pixels of areas that are 0 throughout, and their margin.
 
-    What is invalid is 0, too, so that narrow borders are found, but has no margin of its own.
+    Invalid pixels count as 0, so that narrow borders are found, but have no margin of their own.
 
-    Many rasters fill what they do not cover with 0 without declaring it. The borders of such areas
-    would be the strongest edges of the image, and the same in images of different places.
+    Many rasters fill uncovered areas with 0 without declaring it. The borders of such areas would
+    be the strongest edges of the image, and the same in images of different places.
     """
     zero = (values == 0).astype(np.uint8)
     if not zero.any():
         return zero > 0
     areas = cv2.morphologyEx(zero, cv2.MORPH_OPEN, np.ones((_EMPTY_PX, _EMPTY_PX), np.uint8))
     areas[~valid] = 0
-    # As far as interpolation reaches around them.
+    # The margin is the reach of interpolation.
     return cv2.dilate(areas, np.ones((2 * REACH["cubic"] + 1,) * 2, np.uint8)) > 0
 
 
@@ -108,7 +108,7 @@ def window_sums(image: NDArray[Any], side_px: int) -> NDArray[Any]:
 
 
 def distance_to_masked(valid: Mask) -> FloatImage:
-    """Return how far each pixel is from a masked one, in pixels; infinite without one."""
+    """Return the distance of each pixel from a masked one, in pixels; infinite without one."""
     if valid.all():
         return np.full(valid.shape, np.inf, np.float32)
     return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
@@ -120,6 +120,6 @@ def is_logarithmic(known: FloatImage) -> bool:
 
 
 def middle_window(grid: Grid, side_px: int = 2048) -> Window:
-    """Return the middle of a grid, at most `side_px` a side: enough to see what an image is."""
+    """Return the middle of a grid, at most `side_px` a side, as a sample of the image's content."""
     width, height = min(grid.width, side_px), min(grid.height, side_px)
     return Window((grid.width - width) // 2, (grid.height - height) // 2, width, height)

@@ -1,4 +1,4 @@
-"""What mask rasters let take part of other grids."""
+"""Mask rasters evaluated on other grids."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .reading import RasterSource
 from .warping import sample, sample_by
 from .windows import FloatImage, Mask, Window
 
-# A larger pixel takes part if so much of it does: all but what interpolation hardly weighs.
+# A larger pixel takes part if this share of it does: all but parts of negligible weight.
 _KEPT_SHARE = 0.99
 
 
@@ -23,7 +23,7 @@ def kept_on(
     keeps: Callable[[FloatImage], Mask],
     span: tuple[int, int],
 ) -> Mask:
-    """Return which pixels of a grid a mask's first band lets take part; beyond the mask none.
+    """Return which pixels of a grid a mask's first band keeps; none beyond the mask.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def kept_on(
     grid
         The grid.
     to_mask_px
-        Takes its map positions to pixels of the mask.
+        Takes the grid's map positions to pixels of the mask.
     keeps
-        Returns which of the mask's values take part; pixels without data never do.
+        Returns which of the mask's values are kept; pixels without data never are.
     span
-        Columns and rows of the mask that must take part together, as `reduction` has them; (1, 1):
-        the nearest pixel decides.
+        Columns and rows of the mask that must all be kept, as from `reduction`; (1, 1): the nearest
+        pixel decides.
     """
     if span == (1, 1):
         values, known = sample(mask, grid, to_mask_px, "nearest", 1)

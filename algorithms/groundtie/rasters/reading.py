@@ -1,4 +1,4 @@
-"""Reading windows of rasters, with all their ways of stating that a pixel holds no data."""
+"""Reading of windows of rasters, with all ways in which rasters mark pixels without data."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ class RasterSource:
     Parameters
     ----------
     path
-        Name of the file, GDAL's name of the dataset, or what an array is called.
+        Name of the file, of GDAL's dataset, or of an array.
     grid
-        Where its pixels lie; pixel coordinates if the raster does not state it.
+        Grid of the pixels; in pixel coordinates if the raster has no georeferencing.
     bands
-        What the raster states of each band.
+        Metadata of each band.
     has_mask_band
-        Whether a mask that is no band (`.msk`, internal mask, masked array) marks valid pixels.
+        Whether a mask outside the bands (`.msk`, internal mask, masked array) marks valid pixels.
     has_masks_by_band
-        Whether such masks of different bands may be different.
+        Whether such masks may differ between bands.
     interleave
         "pixel", "band" or None.
     colormap
@@ -80,7 +80,7 @@ class RasterSource:
         self.close()
 
     def close(self) -> None:
-        """Close the file; reading opens it again. What the caller has opened stays open."""
+        """Close the file; reading opens it again. A dataset that the caller opened stays open."""
         self._handles.close()
         if self._overviews is not None:
             self._overviews.close()
@@ -91,7 +91,7 @@ class RasterSource:
 
     @property
     def is_file(self) -> bool:
-        """Whether its name opens it again: it is neither in memory nor a dataset of the caller."""
+        """Whether its name opens it again: it is neither in memory nor the caller's dataset."""
         return isinstance(self._handles, FileHandles)
 
     @property
@@ -118,7 +118,7 @@ class RasterSource:
     def alpha_band(self) -> int | None:
         """Number, from 1, of the band of opacity."""
         kinds = [band.interpretation for band in self.bands]
-        # What a band that stands alone is called, it is the image.
+        # A single band is the image, whatever its interpretation.
         is_there = ColorInterp.alpha in kinds and len(kinds) > 1
         return kinds.index(ColorInterp.alpha) + 1 if is_there else None
 
@@ -146,9 +146,9 @@ class RasterSource:
             Number of the band, from 1; None takes the mean of all bands but alpha. Scale and
             offset of the bands are not applied.
         out_shape
-            Height and width, smaller than the window's, of the result; each of its pixels is
-            the mean of the valid pixels in its area. None keeps the full resolution. Of remote
-            rasters overviews are read, as far as they hold such means.
+            Height and width of the result, smaller than the window's. Each of its pixels is the
+            mean of the valid pixels in its area. None keeps the full resolution. Remote rasters
+            are read from overviews, as far as these hold such means.
 
         Returns
         -------
@@ -156,8 +156,8 @@ class RasterSource:
             Shape `out_shape`, amplitudes for complex rasters; 0 where invalid.
         valid
             Same shape; False for nodata, masked and transparent pixels, NaN, infinity, the lowest
-            number of single precision and what that cannot hold. A pixel of a reduced result is
-            valid if half of its area is; one of several bands if it is valid in all.
+            number of single precision and numbers beyond its range. A pixel of a reduced result is
+            valid if half of its area is; a pixel of several bands, if it is valid in all of them.
 
         Raises
         ------
@@ -176,7 +176,7 @@ class RasterSource:
                 one = len(bands) == 1
                 image = values[0].astype(np.float32) if one else values.mean(0, np.float32)
             known = np.asarray(valid.all(axis=0))
-            # Whole numbers are finite; one band of single precision was looked at as it was read.
+            # Integers are finite; a single band of single precision was checked when it was read.
             if self.dtype.kind in "fc" and not (one and self.dtype == np.float32):
                 known &= are_measured(image)
             return image, known
@@ -189,7 +189,7 @@ class RasterSource:
                 reduction = min(window.height / out_shape[0], window.width / out_shape[1])
                 level = self._overviews.coarsest(self, reduction)
             values, valid = average_window(grey, self, level, window, out_shape)
-            # Their sums may be larger than single numbers.
+            # Sums of finite numbers may overflow.
             valid &= np.isfinite(values)
         return np.where(valid, values, np.float32(0)).astype(np.float32), valid
 
@@ -201,8 +201,8 @@ class RasterSource:
     ) -> tuple[NDArray[Any], Mask]:
         """Read a window of several bands, each with its own validity.
 
-        Like `read`, but values keep the raster's dtype (a reduced result is floating-point or
-        complex) and invalid pixels their values, except that NaN, infinity and the lowest number
+        As `read`, but the values keep the raster's dtype (a reduced result is floating-point or
+        complex). Invalid pixels keep their values, except that NaN, infinity and the lowest number
         become 0. Both results have the shape (bands, height, width). The alpha band is valid where
         it is not 0.
         """
@@ -220,17 +220,17 @@ class RasterSource:
         return average_window(native, self, self, window, out_shape)
 
     def driver(self) -> str:
-        """Return the name of GDAL's driver that reads it."""
+        """Return the name of the GDAL driver that reads the raster."""
         with self._handles.borrow() as dataset:
             return str(dataset.driver)
 
     def files(self) -> list[str]:
-        """Return the names of the files that GDAL reads for it, those a virtual one is made of."""
+        """Return the names of all files that GDAL reads for it, the sources of a VRT included."""
         with self._handles.borrow() as dataset:
             return list(dataset.files)
 
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8] | None]:
-        """Read all bands, shape (bands, h, w), and the mask, (h, w), of a window inside as stored.
+        """Read all bands, (bands, h, w), and the mask, (h, w), as stored, of a window inside.
 
         The mask is None if the raster has no mask band.
         """
@@ -250,7 +250,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
         dataset, which stays open, a `Raster`, a numpy array or an `xarray.DataArray` (see
         `arrays.in_memory`).
     allow_sensor_geometry
-        Take images that are located by RPCs or GCPs only; their grid is in pixel coordinates.
+        Accept images located by RPCs or GCPs only; their grid is in pixel coordinates.
 
     Raises
     ------
@@ -285,7 +285,7 @@ def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSou
             has_masks_by_band=by_band,
             interleave=interleaving.value.lower() if interleaving else None,
             colormap=colormap(dataset),
-            # Drivers do not list all that they have: JPEG 2000 no RPCs.
+            # Drivers do not list all their domains: JPEG 2000 omits RPC.
             tags={
                 ns: tags_of(dataset, ns=ns or None)
                 for ns in dict.fromkeys(("", *stated(dataset.tag_namespaces), "RPC"))

@@ -1,4 +1,4 @@
-"""Rasters that are read over a network: how GDAL is asked for as little as will do."""
+"""Rasters read over a network: GDAL's settings for few requests, and servers' errors."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from rasterio.env import getenv, hasenv
 from ..raster_names import is_remote
 from ..stac_items import SILENT_SECONDS
 
-# https://gdal.org/en/stable/user/virtual_file_systems.html; what the user has set comes first.
+# https://gdal.org/en/stable/user/virtual_file_systems.html; the user's settings take precedence.
 _SETTINGS = {
-    # What may lie beside a file is not asked for: each question is a request.
+    # Sidecar files are not looked for, as each look-up is a request.
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
     # The directories of a Cloud Optimized GeoTIFF in one request.
     "GDAL_INGESTED_BYTES_AT_OPEN": "32768",
     "GDAL_HTTP_MERGE_CONSECUTIVE_RANGES": "YES",
     "GDAL_HTTP_MULTIPLEX": "YES",
-    # Handles of several threads share what was read.
+    # Cache shared by the handles of all threads.
     "CPL_VSIL_CURL_CACHE_SIZE": "100000000",
     "GDAL_HTTP_MAX_RETRY": "3",
     "GDAL_HTTP_RETRY_DELAY": "1",
@@ -29,7 +29,7 @@ _SETTINGS = {
     "GDAL_HTTP_LOW_SPEED_LIMIT": "1",
 }
 
-# Words of GDAL's for what a server answers, and what users may make of it.
+# GDAL's words for a server's answers, and explanations for users.
 _ANSWERS = {
     "404": "there is no such file on the server",
     "does not exist in the file system": "there is no such file on the server",
@@ -41,7 +41,7 @@ _ANSWERS = {
 
 
 def environment(name: str) -> Any:
-    """Return the environment in which GDAL opens and reads a raster; the usual one of files."""
+    """Return the environment in which GDAL opens and reads a raster; the usual one for files."""
     if not is_remote(name):
         return contextlib.nullcontext()
     own = {*os.environ, *(getenv() if hasenv() else ())}
@@ -49,9 +49,9 @@ def environment(name: str) -> Any:
 
 
 def reason_of_server(reason: str, name: str) -> str:
-    """Return GDAL's reason why a remote raster cannot be read in words of this package.
+    """Return GDAL's reason why a remote raster cannot be read, explained for users.
 
-    The numbers in the raster's own name, such as a server's port, are no answers.
+    Numbers in the raster's own name, such as a server's port, must not count as answers.
     """
     stated = reason.replace(name.removeprefix("/vsicurl/"), "")
     if reason.startswith("CURL error: "):

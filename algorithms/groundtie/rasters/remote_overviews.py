@@ -1,7 +1,7 @@
 """Overviews of remote rasters, read in place of pixels that would be averaged.
 
-Only those whose pixels are seen to be means of the level before: picked ones lie off by half a
-pixel, and show what averaging would have taken away.
+Only overviews whose pixels prove to be means of the previous level are used: picked pixels are
+displaced by half a pixel, and contain aliasing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from .windows import Mask, Window
 if TYPE_CHECKING:
     from .reading import RasterSource
 
-# Pixels of a side that are looked at to see how an overview was made, in places of the image.
+# Side of the samples from which the kind of an overview is determined, in pixels, and their places
+# in the image.
 _SAMPLE_PX = 64
 _PLACES = (0.75, 0.5, 0.25)
 
@@ -34,7 +35,7 @@ class RemoteOverviews:
     Parameters
     ----------
     count
-        How many there are.
+        Number of overviews.
     """
 
     count: int
@@ -43,14 +44,14 @@ class RemoteOverviews:
     _is_complete: bool = field(init=False, repr=False, default=False)
 
     def coarsest(self, source: RasterSource, reduction: float) -> RasterSource:
-        """Return the smallest image of a raster that still has to be reduced, or just not.
+        """Return the smallest level of a raster that is not smaller than the result.
 
         Parameters
         ----------
         source
             The raster itself.
         reduction
-            By how much its pixels are to be made larger.
+            Factor by which its pixels are to be enlarged.
         """
         with self._lock:
             if not self._known:
@@ -83,7 +84,7 @@ def _factor(source: RasterSource, level: RasterSource) -> float:
 
 
 def _overview(source: RasterSource, number: int) -> RasterSource | None:
-    """Return an overview as a raster; None if it is too small to be told how it was made."""
+    """Return an overview as a raster; None if it is too small to determine its kind."""
     handles = FileHandles(source.path, number)
     with handles.borrow() as dataset:
         width, height = dataset.width, dataset.height
@@ -96,9 +97,9 @@ def _overview(source: RasterSource, number: int) -> RasterSource | None:
 
 
 def _is_mean_of(level: RasterSource, before: RasterSource) -> bool:
-    """Return whether an overview's pixels are nearest to means of those below.
+    """Return whether an overview's pixels are best explained as means of the level below.
 
-    Others would be picked ones, or means about another place, as those of wavelets are.
+    Alternatives are picked pixels, and means about another place, as with wavelets.
     """
     band = level.image_bands[0]
     for place in _PLACES:
@@ -119,7 +120,7 @@ def _is_mean_of(level: RasterSource, before: RasterSource) -> bool:
             return True
         if misses[0] > 0:
             return False
-    return False  # nothing but one value: no place states how it was made
+    return False  # uniform samples do not determine the kind
 
 
 def _mean(

@@ -1,4 +1,4 @@
-"""A terrain model as an image of itself: as the sun lights it, or as a radar images it."""
+"""Terrain models rendered as images: lit by the sun, or imaged by a radar."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ from .reading import FloatImage, RasterSource, Window
 SUN = "sun"
 LIGHTS = (SUN, RADAR)
 
-# Light from all the sky, as a share of the sun's on level ground; slopes that face the radar are
-# brighter than level ground by so much at most, as what is laid over has no end.
+# Share of diffuse light from the sky in the brightness of level ground.
 _AMBIENT = 0.3
+
+# Largest radar power of slopes relative to level ground: in layover it would be unlimited.
 _BRIGHTEST = 10.0
 
-# A radar image and what is rendered of a terrain model are matched at pixels this many times as
-# large: speckle averages out, and relief has larger forms than what it covers. Measured with
-# `benchmarks/run.py --only mountains`: of hills at 1, 6 of 16 pairs are accepted, at 2 all 16.
+# A radar image and a rendered terrain model are matched at pixels this many times as large: speckle
+# averages out, and relief has larger forms than the land cover. Measured with `benchmarks/run.py
+# --only mountains`: in hills, 6 of 16 pairs are accepted at 1, and all 16 at 2.
 _RADAR_OF_TERRAIN = 2.0
 
 
 @dataclass(frozen=True)
 class Light:
-    """Where the sun or a radar stands, seen from the ground: 45° above the horizon.
+    """Direction of the sun or of a radar, seen from the ground, 45° above the horizon.
 
-    This elevation hardly counts: similarity asks where brightness changes, not by how much.
+    The elevation hardly matters: similarity depends on where brightness changes, not by how much.
 
     Parameters
     ----------
     kind
         One of `LIGHTS`.
     azimuth_deg
-        Clockwise from north.
+        Azimuth, clockwise from north.
     """
 
     kind: str
@@ -50,15 +51,15 @@ class Light:
 
     @property
     def enlargement(self) -> float:
-        """How many times as large as the coarser image's pixels those are that match in it best."""
+        """Best size of matching pixels, as a multiple of the coarser image's pixel size."""
         return _RADAR_OF_TERRAIN if self.kind == RADAR else 1.0
 
     def shade(self, east: FloatImage, north: FloatImage) -> FloatImage:
-        """Return how bright ground is that rises by so much per metre to the east and north.
+        """Return the brightness of ground with slopes, per metre, to the east and north.
 
-        The sun's light is Lambert's cosine over that of level ground. A radar gathers in a pixel,
-        which is a step in range, what lies in it of the ground: the more, the more this faces the
-        radar. Ground that turns away from it farther than it stands high is in radar shadow.
+        Sunlight follows Lambert's cosine law, relative to level ground. A radar pixel is a step in
+        slant range and collects the echoes of all ground within it: the more, the more the slope
+        faces the radar. Slopes facing away by more than the radar's elevation are in radar shadow.
         """
         azimuth = math.radians(self.azimuth_deg)
         away = -(east * np.float32(math.sin(azimuth)) + north * np.float32(math.cos(azimuth)))
@@ -70,14 +71,14 @@ class Light:
 
 
 def rendered(source: RasterSource, light: Light, band: int | None = None) -> RasterSource:
-    """Return a raster of heights as one of brightness; pixels are rendered as they are read.
+    """Return a raster of heights as a raster of brightness, rendered as it is read.
 
     Parameters
     ----------
     source
-        Heights; or what was rendered of it, which is rendered anew.
+        Heights; a rendered raster is rendered anew from its heights.
     light
-        What lights it.
+        Direction and kind of the illumination.
     band
         Number of the band of heights; None: the first.
     """
@@ -91,7 +92,7 @@ def rendered(source: RasterSource, light: Light, band: int | None = None) -> Ras
 
 @dataclass(frozen=True)
 class _Rendering:
-    """Lends itself as handles do, and renders what is read."""
+    """Handles that lend themselves, and render heights as they are read."""
 
     heights: RasterSource
     light: Light
@@ -111,7 +112,7 @@ class _Rendering:
     def read(self, indexes: Sequence[int], *, window: Any, out_dtype: Any) -> FloatImage:
         """Return the brightness of a window, shape (1, h, w); NaN if unknown.
 
-        It has one band, of float32, and nothing but these tells what is valid.
+        The only band is of float32; nothing but NaN marks invalid pixels.
         """
         (top, bottom), (left, right) = window.toranges()
         around = Window(int(left) - 1, int(top) - 1, int(right - left) + 2, int(bottom - top) + 2)
@@ -122,7 +123,7 @@ class _Rendering:
 
 
 def _slopes(heights_m: FloatImage, grid: Grid) -> tuple[FloatImage, FloatImage]:
-    """Return how heights, (h + 2, w + 2), rise per metre to the east and to the north, (h, w)."""
+    """Return slopes per metre to the east and to the north, (h, w), of heights (h + 2, w + 2)."""
     along = (heights_m[1:-1, 2:] - heights_m[1:-1, :-2]) / 2
     down = (heights_m[2:, 1:-1] - heights_m[:-2, 1:-1]) / 2
     t, (east_m, north_m) = grid.transform, grid.metres_per_unit

@@ -1,4 +1,4 @@
-"""Which grid a registered raster gets, when it does not get the reference's as it is."""
+"""Grids for registered rasters that do not use the reference's grid as it is."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from .grid import (
 from .tiling import require_workable
 from .windows import Window
 
-# A registered raster has a diagonal of so many times as many pixels as the input has. The largest
+# Largest ratio of the diagonal, in pixels, of a registered raster to that of the input. The largest
 # scale that is searched for is 4, and a projection may double that again.
 _LARGEST_STRETCH = 16.0
 
 
 def covering_grid(grid: Grid, xy: FloatArray, *, within: bool = False) -> Grid:
-    """Return the part of a grid, continued beyond its borders, that covers a footprint.
+    """Return the part of a grid, extended beyond its borders if needed, that covers a footprint.
 
     Parameters
     ----------
     grid
-        Gives CRS, pixel size and where the pixels' borders are.
+        Grid that gives CRS, pixel size and alignment of the pixels.
     xy
-        Map positions in the grid's CRS, shape (n, 2); those that are not finite are left out.
+        Map positions in the grid's CRS, shape (n, 2); non-finite ones are ignored.
     within
-        Cut the result to the grid.
+        Whether the result is cropped to the grid.
 
     Raises
     ------
     NoOverlapError
-        Nothing is left.
+        No pixel is left.
     GridSizeError
-        It would have more pixels than a raster can have, or than can be worked through.
+        The result would have more pixels than a raster can have, or than can be processed.
     """
     xy = finite(xy)
     px = grid.map_to_pixel(xy)
@@ -65,7 +65,7 @@ def _covering_px(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the first pixel that covers positions, shape (n, 2), and the one after the last."""
     px = np.clip(px, -MOST_PX, MOST_PX)
-    # By its error alone it needs no further row or column.
+    # An error of position alone must not add a row or column.
     low = np.floor(px.min(axis=0) + 0.5 + POSITION_ERROR_PX).astype(int)
     high = np.ceil(px.max(axis=0) + 0.5 - POSITION_ERROR_PX).astype(int)
     if not within:
@@ -74,7 +74,7 @@ def _covering_px(
 
 
 def _turned(grid: Grid, xy: FloatArray) -> str:
-    """Return words on where a footprint lies that is off a grid in its own longitudes only."""
+    """Return a hint for messages if a footprint misses a grid only by a full turn of longitude."""
     turn = full_turn(grid.crs)
     if turn is None:
         return ""
@@ -95,10 +95,10 @@ def registered_grid(
     pixel_size_m: float | None = None,
     smooth: PointFunction | None = None,
 ) -> Grid:
-    """Return a grid for a registered raster that covers all of it.
+    """Return a grid that covers all of a registered raster.
 
-    In the input's own CRS and without another pixel size it is the input's own grid, continued, so
-    that the result lines up with the input's neighbours. Otherwise it is north-up, with square
+    In the input's own CRS and without another pixel size it is the input's own grid, extended, so
+    that the result is aligned with the input's neighbours. Otherwise it is north-up, with square
     pixels as large as the input's and pixel borders at multiples of their size.
 
     Parameters
@@ -112,15 +112,16 @@ def registered_grid(
     pixel_size_m
         Pixel size in metres (in pixels without georeferencing).
     smooth
-        Near to `px_to_map`, by which pixels are as large as on even ground; None: that itself.
+        Approximation of `px_to_map` without terrain, which determines the pixel size; None:
+        `px_to_map` itself.
 
     Raises
     ------
     NoOverlapError
         The raster lies outside of the domain of the CRS.
     GridSizeError
-        The transform stretches the raster out of all proportion, or the pixels are too many or
-        larger than all of it.
+        The transform stretches the raster excessively, or there are too many pixels, or a pixel is
+        larger than the whole raster.
     """
     smooth = smooth or px_to_map
     usual = _registered_grid(input_grid, px_to_map, crs, None, smooth)

@@ -1,4 +1,4 @@
-"""The bytes of a block of pixels in a TIFF file: predicted, and compressed.
+"""Encoding of a block of pixels in a TIFF file: predictor and compression.
 
 Source: [Adobe1992] section 14, [Adobe2005].
 """
@@ -24,14 +24,14 @@ _PAIRS = {"complex_int16": "<i2", "complex_int32": "<i4"}
 
 @dataclass(frozen=True)
 class PixelType:
-    """How pixels are stored.
+    """Type of pixels, in the file and in memory.
 
     Parameters
     ----------
     name
-        rasterio's name of their type.
+        rasterio's name of the type.
     memory
-        The type that holds them in memory.
+        Type in memory.
     """
 
     name: str
@@ -39,7 +39,7 @@ class PixelType:
 
     @property
     def predictor(self) -> int:
-        """What is compressed: the values, differences of integers, or those of parts of floats."""
+        """Predictor: none, differences of integers, or differences of the bytes of floats."""
         kind, bits = self.memory.kind, self.memory.itemsize * 8
         if kind == "f":
             return _FLOATS
@@ -57,8 +57,8 @@ class PixelType:
             stored = _differences(stored.view(f"<u{stored.dtype.itemsize}"))
         elif self.predictor == _FLOATS:
             stored = _split(stored)
-        # Differences of images repeat nothing but themselves: zlib's strategy for PNG takes half
-        # the time of searching for more, and is no larger.
+        # Differences of images contain only runs of equal bytes: run-length encoding takes half the
+        # time of searching for other matches, and the result is no larger.
         strategy = zlib.Z_DEFAULT_STRATEGY if self.predictor == _NO_PREDICTOR else zlib.Z_RLE
         return _compressed(stored, strategy)
 
@@ -69,13 +69,13 @@ def encoded_mask(valid: Mask) -> bytes:
 
 
 def _compressed(values: NDArray[Any], strategy: int) -> bytes:
-    # The next levels take twice the time for a few percent.
+    # The next levels take twice the time and save a few percent.
     compressor = zlib.compressobj(zlib.Z_BEST_SPEED, strategy=strategy)
     return compressor.compress(values.data) + compressor.flush()
 
 
 def _whole(values: NDArray[Any]) -> NDArray[Any]:
-    """Return a block at the border of the image with what lies beyond: what compresses best."""
+    """Return a block at the image's border extended to full size with values that compress well."""
     height, width = values.shape[:2]
     out = np.zeros((BLOCK, BLOCK, *values.shape[2:]), values.dtype)
     out[:height, :width] = values
@@ -91,7 +91,7 @@ def _differences(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _split(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return rows of floats with all first bytes in front, then the second ones, as differences."""
+    """Return rows of floats as byte planes, most significant bytes first, as differences."""
     height, width, samples = values.shape
     parts = values.view(np.uint8).reshape(height, width * samples, -1)
     planes = parts[:, :, ::-1].transpose(0, 2, 1).reshape(height, -1, samples)

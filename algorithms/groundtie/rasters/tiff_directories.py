@@ -1,8 +1,8 @@
-"""The directories of a TIFF file: which blocks of which image lie where.
+"""The directories of a TIFF file, with the positions of all blocks of its images.
 
-GDAL makes the tags, all but size and blocks (see `tags_of`); the pixels are written by Python (see
-`tiff_file`), where a full disk is an exception. Within GDAL it is met by libtiff: that may end the
-process, or write a file that lacks pixels and says nothing.
+GDAL makes the tags, except for size and blocks (see `tags_of`). The pixels are written by Python
+(see `tiff_file`), where a full disk raises an exception. Within GDAL, libtiff may end the process
+on a full disk, or silently write a file that lacks pixels.
 
 Source: [Adobe1992], [OGC2023].
 """
@@ -20,23 +20,23 @@ from .windows import Window
 
 BLOCK = 512
 
-# Tags, and the types of values with their sizes.
+# Tags, and the types of values with their sizes in bytes.
 _KIND, _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _COLOURS = 254, 256, 257, 258, 259, 262
 _SAMPLES, _PLANES, _PALETTE, _OFFSETS, _COUNTS = 277, 284, 320, 324, 325
 _PREDICTOR, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _FORMAT, _NODATA = 317, 322, 323, 338, 339, 42113
 _ASCII, _SHORT, _LONG, _LONG8 = 2, 3, 4, 16
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 16: 8, 17: 8}
 
-# What an overview states as its image does, besides its size.
+# Tags that an overview shares with its image.
 _SHARED = (_BITS, _COMPRESSION, _COLOURS, _SAMPLES, _PLANES, _PREDICTOR, _PALETTE, _TILE_WIDTH,
            _TILE_HEIGHT, _EXTRA, _FORMAT, _NODATA)  # fmt: skip
 
-# Kinds of images, which may add up.
+# Kinds of images, which may be combined.
 _OVERVIEW, _MASK = 1, 4
 _COLOURS_OF_MASK, _UNSIGNED = 4, 1
 
-# What a Cloud Optimized GeoTIFF states of its blocks: in front of each lies its size, behind it its
-# last bytes again. Source: [OGC2023].
+# Declaration of the blocks' layout in a Cloud Optimized GeoTIFF: each block is preceded by its
+# size, and followed by a copy of its last bytes. Source: [OGC2023].
 _COG = b"""LAYOUT=IFDS_BEFORE_DATA
 BLOCK_ORDER=ROW_MAJOR
 BLOCK_LEADER=SIZE_AS_UINT4
@@ -56,15 +56,15 @@ class Image:
     Parameters
     ----------
     width, height
-        In pixels.
+        Size in pixels.
     tags
-        Type, count and bytes of what it states, by number.
+        Type, count and bytes of each tag's value, by number of the tag.
     planes
-        In how many planes its bands lie: 1, or one each.
+        Number of planes of its bands: 1, or one for each band.
     mask
-        Which of its pixels are valid; None: nothing states it.
+        Mask of its valid pixels, or None.
     offsets, counts
-        Where each block lies and how many bytes it has, shape (planes, rows, cols); 0: not yet.
+        Position and size of each block in bytes, shape (planes, rows, cols); 0: not yet written.
     """
 
     width: int
@@ -81,11 +81,11 @@ class Image:
 
     @property
     def images(self) -> list[Image]:
-        """It and its mask, in the order of their directories."""
+        """The image and its mask, in the order of their directories."""
         return [self] if self.mask is None else [self, self.mask]
 
     def overview(self) -> Image:
-        """Return an image of half the size of this one, and its mask, without blocks yet."""
+        """Return an image of half this size, with its mask, without blocks yet."""
         width, height = -(-self.width // 2), -(-self.height // 2)
         kind = _OVERVIEW | _number(self.tags.get(_KIND, _short(0)))
         shared = {tag: self.tags[tag] for tag in _SHARED if tag in self.tags}
@@ -93,7 +93,7 @@ class Image:
         return Image(width, height, {**shared, _KIND: _long(kind)}, self.planes, mask)
 
     def blocks(self, window: Window) -> Iterator[tuple[int, int, Window]]:
-        """Return the row and column of each block that a window touches, and its pixels."""
+        """Yield the row and column of each block that a window touches, and the block's pixels."""
         for row in range(window.row // BLOCK, -(-(window.row + window.height) // BLOCK)):
             for col in range(window.col // BLOCK, -(-(window.col + window.width) // BLOCK)):
                 left, top = col * BLOCK, row * BLOCK
@@ -101,7 +101,7 @@ class Image:
                 yield row, col, Window(left, top, *size)
 
     def entries(self, big: bool) -> list[tuple[int, Tag]]:
-        """Return all that a directory states, in the order of the tags."""
+        """Return all entries of the directory, in the order of the tags."""
         kind, dtype = (_LONG8, "<u8") if big else (_LONG, "<u4")
         size = self.offsets.size
         made: Tags = {
@@ -116,19 +116,19 @@ class Image:
 def base_image(
     template: bytes, width: int, height: int, masked: bool, nodata: int | None = None
 ) -> Image:
-    """Return a raster's image of a size with what a template states, without blocks yet.
+    """Return the image of a raster with the tags of a template, without blocks yet.
 
     Parameters
     ----------
     template
-        A classic TIFF file, little endian, of the same bands and blocks.
+        A classic TIFF file, little endian, with the same bands and blocks.
     width, height
-        In pixels.
+        Size in pixels.
     masked
-        Whether it has a mask, of one bit a pixel.
+        Whether the image has a mask, of one bit a pixel.
     nodata
-        The nodata value of integers; None: what the template states. rasterio writes large ones as
-        floating-point numbers, of which GDAL reads the digits before the point.
+        The nodata value of integers; None: the template's. rasterio writes large ones as
+        floating-point numbers, of which GDAL reads the digits before the decimal point.
     """
     tags = tags_of(template)
     if nodata is not None:
@@ -169,13 +169,13 @@ def tags_of(content: bytes) -> Tags:
 def header(images: Sequence[Image], big: bool, cog: bool = False) -> bytes:
     """Return the start of a file: the directories of its images, before all blocks.
 
-    Its length depends on the images' sizes alone, and not on where the blocks lie; the header of
-    the first images of several has the same start.
+    Its length depends only on the sizes of the images, not on the positions of the blocks. The
+    header of only the first images has the same layout.
 
     Parameters
     ----------
     images
-        The raster first, each mask behind its image.
+        The raster first, each mask after its image.
     big
         Whether offsets have 64 bits.
     cog
@@ -195,7 +195,7 @@ def header(images: Sequence[Image], big: bool, cog: bool = False) -> bytes:
 
 
 def _directory(entries: list[tuple[int, Tag]], start: int, big: bool, last: bool) -> bytes:
-    """Return a directory that lies at `start`, with its values behind it, and the next behind."""
+    """Return a directory at `start`, followed by its values and then by the next directory."""
     count, entry, word = ("<Q", "<HHQ", "<Q") if big else ("<H", "<HHI", "<I")
     width = struct.calcsize(word)
     behind = start + struct.calcsize(count) + len(entries) * (4 + 2 * width) + width

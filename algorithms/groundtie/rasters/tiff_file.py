@@ -1,7 +1,7 @@
-"""TIFF files, written block by block by Python itself: what goes wrong is an exception.
+"""TIFF files, written block by block by Python itself, so that failures become exceptions.
 
-The blocks lie in the file in the order in which they were completed, whatever the number of threads
-that compress: the same pixels make the same bytes.
+The blocks lie in the file in the order of their completion, for any number of compressing threads:
+the same pixels give the same bytes.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from .tiff_blocks import PixelType, encoded_mask
 from .tiff_directories import AROUND_COG_BLOCK, Image, header
 from .windows import Window
 
-# Deflate makes no more than this out of a byte: two bits for 258 of them, [Deutsch1996] 3.2.5.
+# Largest compression ratio of Deflate: two bits for 258 bytes, [Deutsch1996] 3.2.5.
 _BEST_COMPRESSION = 1032
 
-# BigTIFF begins where the offsets of TIFF end; as GDAL's IF_SAFER, well before.
+# Files that may be larger become BigTIFF: as with GDAL's IF_SAFER, well below TIFF's limit.
 _LARGEST_CLASSIC = 2_000_000_000
 
 
 @dataclass
 class _Open:
-    """A block of which a part is known."""
+    """A block that is written in part."""
 
     values: NDArray[Any]
     missing: int
@@ -56,7 +56,7 @@ def require_space(path: Path, raw_bytes: int) -> None:
     path
         The file.
     raw_bytes
-        Of its pixels, not compressed.
+        Size of its pixels, uncompressed.
     """
     least = raw_bytes // _BEST_COMPRESSION
     with writing(path):
@@ -75,13 +75,13 @@ class TiledFile:
     levels
         The raster and its overviews.
     pixels
-        The type of its pixels.
+        Type of its pixels.
     bands
-        How many there are.
+        Number of bands.
     executor
-        Where blocks are compressed.
+        Executor that compresses blocks.
     ahead
-        How many wait to be written, at most.
+        Largest number of blocks waiting to be written.
     """
 
     path: Path
@@ -97,7 +97,7 @@ class TiledFile:
 
     def __enter__(self) -> TiledFile:
         with writing(self.path):
-            # Without a buffer: what cannot be written must not be tried again when it is closed.
+            # Unbuffered: closing the file must not retry a failed write.
             self._file = self.path.open("w+b", buffering=0)
             try:
                 _write(self._file, bytes(len(header(self._images, self._big))))
@@ -120,21 +120,21 @@ class TiledFile:
         valid: NDArray[Any] | None = None,
         level: int = 0,
     ) -> None:
-        """Write pixels of some bands; each must be written once, and not change any more.
+        """Write pixels of some bands, each pixel once; the arrays must not change afterwards.
 
         Parameters
         ----------
         values
             Shape (bands, h, w), or (h, w) for a single band.
         indexes
-            The bands, from 1; None: all. Where all lie in one plane they must be all.
+            The bands, from 1; None: all. If all bands share one plane, all must be given.
         window
-            Their place; None: the whole image.
+            Window of the pixels; None: the whole image.
         valid
-            Which pixels are valid, shape (h, w): all but 0. It becomes the mask, if the file has
-            one, and counts beside the first band only.
+            Validity of the pixels, shape (h, w); 0 is invalid. Written as the mask, if the file has
+            one, along with the first band only.
         level
-            0: the raster; else its overviews in the order of their sizes.
+            0: the raster; then its overviews from large to small.
         """
         image = self.levels[level]
         window = window or Window(0, 0, image.width, image.height)
@@ -151,7 +151,7 @@ class TiledFile:
             self._put(image.mask, 0, valid != 0, window, encoded_mask)
 
     def finish(self, levels: int) -> None:
-        """Write all blocks that were given, and let readers know the first levels."""
+        """Write all pending blocks, and a header that makes the first levels readable."""
         self._write_coming(0)
         images = [image for level in self.levels[:levels] for image in level.images]
         if not all(image.counts.all() for image in images):
@@ -162,7 +162,7 @@ class TiledFile:
             self._file.seek(0, os.SEEK_END)
 
     def copy_as_cog(self, path: Path) -> None:
-        """Write a Cloud Optimized GeoTIFF of what is finished: the smallest level first."""
+        """Write the finished file as a Cloud Optimized GeoTIFF, with the smallest level first."""
         start, copied = len(header(self._images, self._big, cog=True)), []
         for level in reversed(self.levels):
             for image in level.images:
@@ -186,7 +186,7 @@ class TiledFile:
 
     @cached_property
     def _raw_bytes(self) -> int:
-        """Bytes of all pixels, not compressed."""
+        """Size of all pixels in bytes, uncompressed."""
         pixel = self.bands * self.pixels.memory.itemsize
         masked = self.levels[0].mask is not None
         sizes = (level.width * level.height for level in self.levels)
@@ -194,7 +194,7 @@ class TiledFile:
 
     @cached_property
     def _big(self) -> bool:
-        """Whether the file may grow beyond what a classic TIFF can hold."""
+        """Whether the file may become too large for a classic TIFF."""
         directories = sum(16 * image.offsets.size for image in self._images)
         return self._raw_bytes + directories > _LARGEST_CLASSIC
 
@@ -226,7 +226,7 @@ class TiledFile:
         part: Window,
         whole: Window,
     ) -> NDArray[Any] | None:
-        """Return a block to which a part was added, if it is complete by that."""
+        """Add a part to a block; return the block if that completes it."""
         if part == whole:
             return values
         key = (id(image), *place)
@@ -240,7 +240,7 @@ class TiledFile:
         return None if block.missing else self._open.pop(key).values
 
     def _write_coming(self, most: int) -> None:
-        """Write blocks, in the order in which they were completed, until few are left."""
+        """Write blocks, in the order of their completion, until at most `most` are waiting."""
         while len(self._coming) > most:
             coming = self._coming.popleft()
             content = coming.content.result()
@@ -251,7 +251,7 @@ class TiledFile:
 
     def _append(self, content: bytes) -> None:
         size = self._file.tell() + len(content)
-        # If the rest compresses as well as what is done.
+        # Size needed if the rest compresses as well as the blocks so far.
         share = min(self._done_bytes / self._raw_bytes, 1)
         with writing(self.path, round(size / share) if share else None):
             _write(self._file, content)

@@ -1,4 +1,4 @@
-"""Reduced images of a raster that is being written."""
+"""Overviews of a raster that is being written."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .metadata import numpy_dtype
 from .tiff_directories import Image
 from .windows import Mask, Window
 
-# Types of which double precision holds all means.
+# Types whose means all fit into double precision.
 _MEANS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
 Task = tuple[list[int], Window]
@@ -25,16 +25,16 @@ Task = tuple[list[int], Window]
 
 @dataclass(frozen=True)
 class Reduced:
-    """An overview, as read from the level before.
+    """An overview, computed from the previous level.
 
     Parameters
     ----------
     handles
-        Of that level in the file, in which it is finished.
+        Handles of the previous level, which is finished in the file.
     level
-        The overview, half the size of that level.
+        The overview, half the size of the previous level.
     nearest
-        Whether pixels are picked; else they are averages of what is valid.
+        Whether pixels are picked; otherwise they are averages of valid pixels.
     """
 
     handles: FileHandles
@@ -42,16 +42,17 @@ class Reduced:
     nearest: bool
 
     def tasks(self, bands: int) -> list[Task]:
-        """Return which bands, from 1, and windows are read at a time."""
+        """Return the groups of bands, from 1, and windows that are processed at a time."""
         numbers = range(1, bands + 1)
         groups = [[*numbers]] if self.level.planes == 1 else [[number] for number in numbers]
         whole = Window(0, 0, self.level.width, self.level.height)
         return [(group, place) for _, _, place in self.level.blocks(whole) for group in groups]
 
     def read(self, task: Task) -> tuple[NDArray[Any], Mask | None]:
-        """Return bands of a window, (bands, h, w), and what is valid in the first, (h, w).
+        """Return bands of a window, (bands, h, w), and the validity of the first, (h, w).
 
-        None where it may stay unknown: there is no mask, or the band is not the file's first.
+        The validity may be None if it is not needed: there is no mask, or the bands do not include
+        the file's first.
         """
         bands, window = task
         with self.handles.borrow() as dataset:
@@ -59,16 +60,16 @@ class Reduced:
             return found or self._resampled(dataset, bands, window)
 
     def _scale(self, dataset: Any) -> tuple[float, float]:
-        """Return how many columns and rows of the level before a pixel of the overview has.
+        """Return how many columns and rows of the previous level a pixel of the overview spans.
 
-        A last row or column of an odd number is shared by all of the overview's pixels.
+        An odd last row or column is distributed over all of the overview's pixels.
         """
         return dataset.width / self.level.width, dataset.height / self.level.height
 
     def _resampled(
         self, dataset: Any, bands: list[int], window: Window
     ) -> tuple[NDArray[Any], Mask | None]:
-        """Return what GDAL makes of any pixels."""
+        """Return `read` by GDAL's resampling, which handles all types of pixels."""
         x, y = self._scale(dataset)
         place = rasterio.windows.Window(
             window.col * x, window.row * y, window.width * x, window.height * y
@@ -80,14 +81,14 @@ class Reduced:
         if self.level.mask is None:
             return values, None
         valid = dataset.read_masks(1, window=place, out_shape=shape, resampling=how) > 0
-        # Where nothing is valid GDAL leaves complex pixels as they are in memory.
+        # GDAL leaves invalid complex pixels uninitialised.
         values[:, ~valid] = 0
         return values, valid if bands[0] == 1 else None
 
     def _means(
         self, dataset: Any, bands: list[int], window: Window
     ) -> tuple[NDArray[Any], Mask] | None:
-        """Return the same of usual types, without GDAL; None: they are not."""
+        """Return `read` as averages without GDAL's resampling; None in unusual cases."""
         if dataset.dtypes[0] not in _MEANS:
             return None
         made = self.level
@@ -121,9 +122,10 @@ class Reduced:
 def _shares(
     before: int, made: int, start: int, count: int, precision: np.dtype[Any]
 ) -> tuple[slice, sparse.csr_matrix]:
-    """Return which pixels of the level before make some of an overview's, and their shares in each.
+    """Return the pixels of the previous level that make some of an overview's, and their shares.
 
-    Along an axis of `before` and `made` pixels; those of the overview are `count` from `start` on.
+    Along an axis of `before` and `made` pixels, for the `count` pixels of the overview from `start`
+    on.
     """
     edges = np.arange(start, start + count + 1) * before / made
     pixels = slice(int(edges[0]), min(int(np.ceil(edges[-1])), before))
@@ -131,7 +133,7 @@ def _shares(
 
 
 def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | None:
-    """Return which pixels of each band are valid, None for all; None: some are transparent."""
+    """Return the valid pixels of each band, None for all pixels; None if some are transparent."""
     masks: dict[int, Mask | None] = {}
     keys = []
     for number in bands:
@@ -140,7 +142,7 @@ def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | No
         if keys[-1] in masks or MaskFlags.all_valid in flags:
             continue
         if MaskFlags.nodata in flags and ColorInterp.alpha in dataset.colorinterp:
-            # As rasterio's masks, which warn that the nodata value counts, and not the alpha band.
+            # The same as rasterio's masks, which warn that nodata takes precedence over alpha.
             values, nodata = dataset.read(number, window=place), dataset.nodata
             mask = ~np.isnan(values) if np.isnan(nodata) else values != nodata
         else:

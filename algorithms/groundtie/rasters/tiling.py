@@ -1,4 +1,4 @@
-"""Rasters worked tile by tile, so that memory is bounded however large they are."""
+"""Processing of rasters tile by tile, so that memory is bounded whatever their size."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .reading import RasterSource
 from .tiff_directories import BLOCK
 from .windows import Window
 
-# Tiles are blocks of the file, small enough for those of a small raster to be worked side by side.
+# Tiles are blocks of the file, small enough to process those of a small raster in parallel.
 _TILE = BLOCK
 
-# What a worker may hold of the result at a time; rasters with many bands are worked in groups.
+# Bytes of the result that a worker may hold; rasters with many bands are processed in groups.
 _TILE_BYTES = 32_000_000
 
-# Pixels that are worked through one by one: a day at 10 million a second. A file of a map service
-# may state more of them than there are bytes on Earth; parts of it are no worse than of any other.
+# Largest number of pixels to be processed one by one: a day at 10 million a second. The file of a
+# map service may declare more pixels than there are bytes on Earth; parts of it are usable.
 _MOST_PIXELS = 1e12
 
 Item = TypeVar("Item")
@@ -28,12 +28,12 @@ Result = TypeVar("Result")
 
 
 def require_workable(grid: Grid, what: str) -> Grid:
-    """Return a grid whose pixels can be worked through one by one.
+    """Return a grid, unchanged, whose pixels can be processed one by one.
 
     Raises
     ------
     GridSizeError
-        They are too many; `what` is what the message calls the grid.
+        There are too many pixels; `what` names the grid in the message.
     """
     if grid.width * grid.height > _MOST_PIXELS:
         raise GridSizeError(
@@ -44,7 +44,7 @@ def require_workable(grid: Grid, what: str) -> Grid:
 
 
 def tiles(grid: Grid, side: int | None = None) -> Iterator[Window]:
-    """Return the tiles that cover a grid, row by row; by default whole blocks of the file."""
+    """Yield the tiles that cover a grid, row by row; by default whole blocks of the file."""
     side = side or _TILE
     for row in range(0, grid.height, side):
         for col in range(0, grid.width, side):
@@ -57,7 +57,7 @@ def tile_count(grid: Grid) -> int:
 
 
 def band_groups(source: RasterSource) -> tuple[tuple[int, ...], ...]:
-    """Return the numbers, from 1, of a raster's bands in groups of which a tile is not too much."""
+    """Return a raster's band numbers, from 1, in groups whose tiles fit into a worker's memory."""
     most = max(_TILE_BYTES // (_TILE * _TILE * source.dtype.itemsize), 1)
     numbers = range(1, source.count + 1)
     return tuple(tuple(numbers[i : i + most]) for i in range(0, source.count, most))
@@ -69,7 +69,7 @@ def in_order(
     items: Iterable[Item],
     ahead: int,
 ) -> Iterator[Result]:
-    """Work on some items at a time, `ahead` at most, and yield the results in their order."""
+    """Process items in a pool, at most `ahead` at a time, and yield the results in order."""
     waiting: deque[Future[Result]] = deque()
     try:
         for item in items:

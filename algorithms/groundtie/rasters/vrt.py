@@ -1,4 +1,4 @@
-"""GDAL's virtual rasters: a file's own pixels, in another place."""
+"""GDAL's virtual rasters: a file's pixels with another geotransform."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from .remote import environment
 
 SUFFIX = ".vrt"
 
-# What else would locate the pixels, or is of the file that they are in.
+# Elements and domains that would locate the pixels otherwise, or belong to the source file.
 _OWN = ("GCPList", "GeoTransform")
 _OWN_DOMAINS = ("RPC", "GEOLOCATION", "DERIVED_SUBDATASETS")
 
-# The domain in which GDAL has the text of a virtual raster, and the only key there.
+# GDAL's metadata domain with the text of a virtual raster, and the only key in it.
 _TEXT = "xml:VRT"
 
-# What a virtual raster states of its pixels, and a band of its own; the rest makes them.
+# Elements of a virtual raster, and of a band, that describe pixels; the others produce them.
 _STATED = ("SRS", "Metadata", "VRTRasterBand")
 _STATED_OF_BAND = (
     "Description",
@@ -49,21 +49,22 @@ _STATED_OF_BAND = (
 def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
     """Write a virtual raster that shows a raster's pixels, masks and overviews on another grid.
 
-    It names the raster's file, relative to itself where both are on one disk: it must stay there.
+    It refers to the raster's file, which must stay in place, by a relative path if both are on one
+    disk.
 
     Parameters
     ----------
     source
         The raster.
     grid
-        Its new grid, of the same size and CRS.
+        The new grid, of the same size and CRS.
     path
         The `.vrt`; see `atomic.Outputs.stage`.
 
     Raises
     ------
     ParameterError
-        The raster is in memory, or its name means another file in another working folder.
+        The raster is in memory, or its name depends on the working folder.
     OutputError
         The file cannot be written.
     """
@@ -91,7 +92,7 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
 
 
 def _showing(dataset: Any, path: Path) -> ElementTree.Element:
-    """Return a virtual raster of a raster that is none itself; `path` is staged."""
+    """Return a virtual raster of a raster that is not virtual itself; `path` is staged."""
     with scratch_file(path) as scratch:
         rasterio.shutil.copy(dataset, scratch, driver="VRT")
         return ElementTree.parse(scratch).getroot()
@@ -100,8 +101,8 @@ def _showing(dataset: Any, path: Path) -> ElementTree.Element:
 def _showing_virtual(dataset: Any, name: str) -> ElementTree.Element:
     """Return a virtual raster of a virtual raster.
 
-    GDAL would copy what that one is made of, and take names for relative to the copy which are
-    relative to the original.
+    GDAL would copy its sources, and interpret names relative to the original as relative to the
+    copy.
     """
     root = ElementTree.fromstring(dataset.tags(ns=_TEXT)[_TEXT])
     size = {key: root.attrib[key] for key in ("rasterXSize", "rasterYSize")}
@@ -137,7 +138,7 @@ def _mask(name: str, band: int) -> ElementTree.Element:
 
 
 def _absolute(name: str) -> str:
-    """Return a raster's name that means the same in any working folder: GDAL makes none so."""
+    """Return a raster's name that holds in any working folder; GDAL keeps names relative."""
     if os.path.exists(name):
         return os.path.abspath(name)
     archives, path = in_archive(name)
@@ -152,8 +153,8 @@ def _absolute(name: str) -> str:
 
 
 def _relative(name: str, folder: Path) -> str:
-    # Systems follow links before they go up to a parent. What a link to the file itself is called
-    # counts: by that GDAL finds what lies beside it.
+    # Systems follow links before they go up to a parent folder. The name of a link to the file is
+    # kept: by this name GDAL finds sidecar files.
     place = os.path.join(os.path.realpath(os.path.dirname(name)), os.path.basename(name))
     try:
         return os.path.relpath(place, os.path.realpath(folder))

@@ -1,4 +1,4 @@
-"""Values of an image at any positions, with invalid pixels carrying no weight."""
+"""Resampling of images at any positions, in which invalid pixels carry no weight."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .windows import Mask, Window
 
 METHODS = tuple(REACH)
 
-# Within windows of fewer pixels a side, single precision holds multiples of 1/8192; a sum with this
-# number, in double precision, is one.
+# In windows with fewer pixels a side, single precision holds multiples of 1/8192 exactly. Adding
+# this number in double precision rounds to such multiples.
 _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
 
-# Reads a window, averaged to a shape if one is given: values and validity, ([bands,] h, w).
+# Reads values and validity, ([bands,] h, w), of a window, averaged to a shape if one is given.
 Read = Callable[[Window, tuple[int, int] | None], tuple[NDArray[Any], Mask]]
 
 
@@ -36,35 +36,34 @@ def resample(
 ) -> tuple[NDArray[Any], Mask]:
     """Interpolate an image at given positions.
 
-    A result is valid if the pixel nearest to it is. Where the kernel of `cubic` or `lanczos`
-    would touch invalid pixels, the valid ones are interpolated bilinearly instead, so that
-    nodata never bleeds.
+    A result is valid if the nearest pixel is. Where the kernel of `cubic` or `lanczos` would touch
+    invalid pixels, the valid ones are interpolated bilinearly instead, so that nodata never bleeds.
 
     Parameters
     ----------
     image
         Shape (h, w) or (bands, h, w), any dtype; finite everywhere.
     valid
-        Its shape, or (h, w) where all bands are valid at the same pixels.
+        The image's shape, or (h, w) if all bands are valid at the same pixels.
     px
         Columns and rows of the positions, shape (2, m, n).
     method
         One of `METHODS`.
     dtype
-        Of the result; by default the image's.
+        Type of the result; by default the image's.
 
     Returns
     -------
     values
         Shape (m, n) or (bands, m, n), rounded and clipped for integers; 0 where invalid.
     valid
-        Shape (m, n) or (bands, m, n), as `valid` has bands.
+        Shape (m, n) or (bands, m, n), with bands if the argument `valid` has bands.
     """
     px = np.asarray(px)
     dtype = image.dtype if dtype is None else dtype
-    # The first row suffices mostly to find that they do not lie on pixels.
+    # Mostly, the first row suffices to show that positions do not lie on pixels.
     if _on_pixels(px[:, :1]) and _on_pixels(px):
-        method = "nearest"  # every kernel gives the pixel itself
+        method = "nearest"  # every kernel returns the pixel itself
     if valid.ndim == 2:
         return _resample(image, valid, px, method, dtype)
     if bool((valid == valid[:1]).all()):
@@ -77,7 +76,7 @@ def resample(
 def _resample(
     image: NDArray[Any], valid: Mask, px: NDArray[Any], method: str, dtype: np.dtype[Any]
 ) -> tuple[NDArray[Any], Mask]:
-    """Return `resample` of an image, whose bands are valid at the same pixels."""
+    """Return `resample` of an image whose bands are valid at the same pixels."""
     if method != "nearest" and valid.all() and are_inside(px, valid.shape, REACH[method]):
         values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
         return rounded(values, dtype), np.ones(px.shape[1:], bool)
@@ -101,14 +100,15 @@ def _resample(
 def _nearest_pixels(px: NDArray[Any]) -> NDArray[Any]:
     """Return the columns or rows of the pixels nearest to positions, as floating-point numbers.
 
-    Halfway between two it is the further one, as GDAL has it: by the even one, every second pixel
-    of an image moved by half a pixel would be lost. Halfway lies what rounding may have moved.
+    Halfway between two pixels, the one with the larger index is taken, as in GDAL: rounding to even
+    would lose every second pixel of an image shifted by half a pixel. Positions a rounding error
+    below halfway count as halfway.
     """
     return np.floor(px + (0.5 + ON_PIXELS))
 
 
 def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mask]:
-    """Return which pixels, columns and rows in `nearest`, are valid, and which are all around."""
+    """Return which pixels at `nearest` are valid, and which have only valid pixels in reach."""
     height, width = valid.shape
     inside = lies_inside(nearest, width, height, 0)
     if valid.all():
@@ -120,14 +120,14 @@ def _validity(valid: Mask, nearest: NDArray[Any], reach: int) -> tuple[Mask, Mas
 
 
 def lies_inside(px: NDArray[Any], width: int, height: int, margin: float) -> Mask:
-    """Return which positions, (2, m, n), lie in an image, so far from its outer pixels' centres."""
+    """Return which positions, (2, m, n), lie in an image, `margin` within its outer centres."""
     cols, rows = px
     inside: Mask = (cols >= margin) & (cols <= width - 1 - margin)
     return inside & (rows >= margin) & (rows <= height - 1 - margin)
 
 
 def are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
-    """Return whether there are positions, (2, m, n), and all lie so in an image of (h, w)."""
+    """Return whether there are positions, (2, m, n), and all lie inside an image of (h, w)."""
     return all(
         axis.size and axis.min() >= margin and axis.max() <= side - 1 - margin
         for axis, side in zip(px, shape[::-1], strict=True)
@@ -137,14 +137,14 @@ def are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
 def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> tuple[int, int]:
     """Return how many input columns and rows a pixel at the grid's centre spans, rounded, >= 1.
 
-    No more than the input's width and height, `size`.
+    The result is no more than the input's width and height, `size`.
     """
     col, row = grid.centre_px
     span = _span(grid, to_input_px, col, row)
     if not np.isfinite(span).all():
         return 1, 1
     if span[0] > size[0] / 2:
-        # An input of the whole Earth may end there and begin anew, but not beside it, too.
+        # A global input may wrap around at this pixel, but not at the neighbouring one, too.
         span = np.fmin(span, _span(grid, to_input_px, col - 1, row))
     cols, rows = (
         max(round(min(float(length), most)), 1) for length, most in zip(span, size, strict=True)
@@ -153,7 +153,7 @@ def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> 
 
 
 def _span(grid: Grid, to_input_px: PointFunction, col: float, row: float) -> FloatArray:
-    """Return how many input columns and rows a pixel spans, (2,); not finite if that is unknown."""
+    """Return how many input columns and rows a pixel spans, (2,); not finite if unknown."""
     around = [[col - 0.5, row], [col + 0.5, row], [col, row - 0.5], [col, row + 0.5]]
     left, right, above, below = to_input_px(grid.pixel_to_map(around))
     with np.errstate(invalid="ignore"):  # positions outside of a projection's domain
@@ -163,7 +163,7 @@ def _span(grid: Grid, to_input_px: PointFunction, col: float, row: float) -> Flo
 def source_window(
     px: FloatArray, size: tuple[int, int], method: str, factor: tuple[int, int] = (1, 1)
 ) -> Window:
-    """Return the part of an image, (width, height) in size, that positions need.
+    """Return the window of an image that is needed to interpolate at positions.
 
     Parameters
     ----------
@@ -174,8 +174,8 @@ def source_window(
     method
         One of `METHODS`.
     factor
-        Columns and rows that are averaged before: the window starts and ends at their multiples.
-        Its borders may lie outside of the image by the kernel's reach; it may be empty.
+        Columns and rows averaged beforehand: the window starts and ends at multiples of them. It
+        may extend beyond the image by the kernel's reach, and may be empty.
     """
     bounds = []
     for axis in (0, 1):
@@ -197,8 +197,8 @@ def sample(
 ) -> tuple[FloatImage, Mask]:
     """Resample one window of a raster, as one grey image, onto a grid that fits into memory.
 
-    Where the grid's pixels are larger than 1.5 input pixels, the mean over the area of so many
-    input pixels is taken first (not with `nearest`).
+    If the grid's pixels are larger than 1.5 input pixels, the input is first averaged over a whole
+    number of pixels (not with `nearest`).
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def sample(
 def sample_bands(
     source: RasterSource, grid: Grid, to_input_px: PointFunction
 ) -> tuple[FloatImage, Mask]:
-    """Resample all bands but alpha as `sample` does one by "cubic"; pixels must be valid in all.
+    """Resample all bands but alpha by "cubic", as `sample`; pixels must be valid in all bands.
 
     Returns
     -------
@@ -247,16 +247,16 @@ def sample_by(
     read: Read,
     factor: tuple[int, int] | None = None,
 ) -> tuple[FloatImage, Mask]:
-    """Return `sample` of what `read` reads of a window, shape ([bands,] height, width).
+    """Return `sample` of the images that `read` reads, shape ([bands,] height, width).
 
-    Of so many columns and rows as `factor` states the mean is taken first; None: as in `sample`.
+    Means over the columns and rows of `factor` are taken first; None: as in `sample`.
     """
     if isinstance(to_input_px, DenseMap):
         px = to_input_px.coordinates(grid)
     else:
         nodes = lattice(grid, to_input_px)
         window = nodes.window()
-        if window is not None:  # every kernel gives the pixels themselves
+        if window is not None:  # every kernel returns the pixels themselves
             return read(window, None)
         px = nodes.coordinates()
     size = source.grid.size
@@ -272,7 +272,7 @@ def sample_by(
 def read_around(
     px: FloatArray, size: tuple[int, int], method: str, factor: tuple[int, int], read: Read
 ) -> tuple[NDArray[Any], Mask, NDArray[Any]] | None:
-    """Read what positions need of an image, averaged by `factor`; None: nothing.
+    """Read the window of an image needed for positions, averaged by `factor`; None if it is empty.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def read_around(
     Returns
     -------
     image, valid, px
-        What `resample` takes: the positions are those in the image.
+        Arguments of `resample`: `px` are the positions in the image that was read.
     """
     window = source_window(px, size, method, factor)
     if not window.width or not window.height:
@@ -297,8 +297,8 @@ def read_around(
 def _inside_window(px: FloatArray, window: Window, factor: tuple[int, int]) -> NDArray[Any]:
     """Return positions, shape (2, m, n), in the pixels of a window averaged by `factor`.
 
-    In windows that are not too large they are rounded to 1/8192 pixel, which single precision
-    holds: so that it serves, and that the same place is the same in another window.
+    In windows that are not too large they are rounded to 1/8192 pixel. Single precision holds these
+    exactly, and the same place has the same position in every window.
     """
     single = max(window.width / factor[0], window.height / factor[1]) < _SINGLE_PX
     inside = np.empty(px.shape, np.float32 if single else np.float64)

@@ -1,4 +1,4 @@
-"""Rasters that memory holds anyway, written at once."""
+"""Rasters that are in memory anyway, written at once."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def write_raster(
         "predictor": 3 if image.dtype.kind == "f" else 2,
         "bigtiff": "if_safer",
     }
-    # In memory: a full disk is no exception within GDAL (see `tiff_directories`).
+    # In memory: within GDAL, a full disk may not raise an exception (see `tiff_directories`).
     with MemoryFile() as memory:
         with memory.open(**profile) as raster:
             raster.write(image)

@@ -1,4 +1,4 @@
-"""Windows of rasters, and which of their pixels are valid."""
+"""Windows of rasters, and the validity of their pixels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Window(NamedTuple):
 
     @classmethod
     def between(cls, low: NDArray[np.int_], high: NDArray[np.int_]) -> Window:
-        """Return the window from the pixel `low` (col, row) to that before `high`."""
+        """Return the window from the pixel `low` (col, row) up to, but without, `high`."""
         (left, top), (width, height) = low.tolist(), (high - low).tolist()
         return cls(left, top, width, height)
 
@@ -39,19 +39,19 @@ class Window(NamedTuple):
         return slice(self.row, self.row + self.height), slice(self.col, self.col + self.width)
 
     def common(self, other: Window) -> Window:
-        """Return what it has in common with another one; nothing: a side is not positive."""
+        """Return the intersection with another window; if empty, a side is not positive."""
         left, top = max(self.col, other.col), max(self.row, other.row)
         right = min(self.col + self.width, other.col + other.width)
         bottom = min(self.row + self.height, other.row + other.height)
         return Window(left, top, right - left, bottom - top)
 
     def widened(self, margin: int) -> Window:
-        """Return it with a margin on each side."""
+        """Return the window with a margin on each side."""
         size = self.width + 2 * margin, self.height + 2 * margin
         return Window(self.col - margin, self.row - margin, *size)
 
     def aligned(self, side: int) -> Window:
-        """Return the whole blocks, of a side and counted from pixel 0, that hold it."""
+        """Return the window of whole blocks, counted from pixel 0, that contains this one."""
         left, top = self.col // side * side, self.row // side * side
         right, bottom = (
             -(-end // side) * side for end in (self.col + self.width, self.row + self.height)
@@ -59,7 +59,7 @@ class Window(NamedTuple):
         return Window(left, top, right - left, bottom - top)
 
     def slices_in(self, whole: Window) -> tuple[slice, slice]:
-        """Return its rows and columns in the array of a window that holds it."""
+        """Return its rows and columns in the array of a window that contains it."""
         return self._replace(col=self.col - whole.col, row=self.row - whole.row).slices
 
 
@@ -73,7 +73,7 @@ def read_window(
     dataset
         A handle of the raster (see `handles`).
     source
-        What the raster states of itself.
+        The raster's metadata.
     window
         The window; beyond the raster nothing is valid.
     bands
@@ -97,14 +97,14 @@ def read_window(
 def _read(dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]) -> NDArray[Any]:
     if len({source.bands[number - 1].dtype for number in bands}) == 1:
         return np.asarray(dataset.read(list(bands), window=place, out_dtype=source.dtype))
-    # rasterio reads bands of several types one by one only.
+    # rasterio can read bands of different types only one by one.
     return np.stack([dataset.read(n, window=place, out_dtype=source.dtype) for n in bands])
 
 
 def _validity(
     dataset: Any, source: RasterSource, place: Any, bands: Sequence[int], values: NDArray[Any]
 ) -> Mask:
-    """Return which of `values` are valid, and set those that can be no measurements to 0."""
+    """Return which of `values` are valid, and set those that cannot be measurements to 0."""
     valid = np.ones(values.shape, bool)
     if values.dtype.kind in "fc":
         valid = are_measured(values)

@@ -1,4 +1,4 @@
-"""GeoTIFF files that carry over all that the input states of its pixels."""
+"""GeoTIFF files that keep the input's metadata of its pixels."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ from .tiff_overviews import Reduced
 from .tiling import in_order
 from .windows import Mask
 
-# Metadata that belong to the file, or locate the pixels, of the input only.
+# Metadata that belong to the input's file, or locate its pixels, and are not carried over.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
 _OWN_TAGS = ("NODATA_VALUES", RUN_TAG)
 
-# Endings by which users ask for a Cloud Optimized GeoTIFF.
+# File-name endings that request a Cloud Optimized GeoTIFF.
 COG_SUFFIXES = (".cog.tif", ".cog.tiff")
 
 
@@ -57,17 +57,17 @@ def create_like(
     """Create a tiled, compressed GeoTIFF with overviews, with the bands and metadata of a raster.
 
     Bands, dtype, colour interpretation, palette, descriptions, units, scales, offsets and tags
-    are those of `source`. RPCs, GCPs and statistics are left out: they are no longer true. The
-    file is the same for any number of workers.
+    are those of `source`. RPCs, GCPs and statistics are omitted, as they no longer hold. The file
+    is the same for any number of workers.
 
     Parameters
     ----------
     source
-        The raster that is imitated.
+        The raster whose bands and metadata are taken over.
     grid
-        Where the new pixels lie.
+        Grid of the new pixels.
     path
-        The file to write; see `atomic.Outputs.stage`. One whose final name ends in `.cog.tif`
+        The file to write; see `atomic.Outputs.stage`. If its final name ends in `COG_SUFFIXES`, it
         becomes a Cloud Optimized GeoTIFF: its blocks are copied once more.
     nodata
         Value of pixels without data, which their type can hold, or None.
@@ -76,16 +76,16 @@ def create_like(
     masked
         Whether a mask is written, too.
     rpc_tags
-        RPCs that locate it, as GDAL's metadata domain RPC.
+        RPCs that locate the raster, as in GDAL's metadata domain RPC.
     workers
-        Threads that compress.
+        Number of threads that compress.
     progress
-        Receives every tile of the overviews, which are made when the block ends.
+        Receives every tile of the overviews, which are made at the end of the `with` block.
 
     Yields
     ------
     TiledFile
-        To which all pixels are to be written. Overviews are averages; nearest for palettes.
+        The file, to which all pixels must be written. Overviews are averages; nearest for palettes.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def create_like(
     path = Path(path)
     require_space(path, grid.width * grid.height * source.count * source.dtype.itemsize)
     names = {band.dtype for band in source.bands}
-    # GDAL's complex integers have no name in numpy.
+    # numpy has no name for GDAL's complex integers.
     pixels = PixelType(names.pop() if len(names) == 1 else source.dtype.name, source.dtype)
     profile = _profile(source, grid, nodata, interleave, pixels)
     with writing(path):
@@ -121,7 +121,7 @@ def create_like(
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:
-    """Return a raster, for `create_like`, as one grey band of a dtype without anything else."""
+    """Return a raster, for `create_like`, as one grey band of a dtype without other metadata."""
     band = BandInfo.plain(dtype)
     return replace(source, bands=(band,), has_mask_band=False, colormap=None, tags={})
 
@@ -160,9 +160,10 @@ def _profile(
 def _template(
     source: RasterSource, profile: dict[str, Any], rpc_tags: Mapping[str, str] | None
 ) -> tuple[bytes, bytes | None]:
-    """Return a GeoTIFF of one block that states what the raster is to state.
+    """Return a GeoTIFF of one block with the metadata of the raster to be written.
 
-    Beside it, in GDAL's `.aux.xml`, stands what GeoTIFF cannot hold, as some CRSs; None: nothing.
+    The second result is GDAL's `.aux.xml` with metadata that GeoTIFF cannot hold, such as some
+    CRSs, or None.
     """
     with MemoryFile(ext=".tif") as memory:
         with memory.open(**profile) as dataset:
@@ -201,7 +202,7 @@ def _describe(dataset: Any, source: RasterSource) -> None:
 
 
 def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> None:
-    """Write all overviews, each from the level before."""
+    """Write all overviews, each from the previous level."""
     count = len(file.levels)
     for number in range(1, count):
         file.finish(number)
@@ -218,7 +219,9 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
 
 
 def shared_nodata(source: RasterSource) -> float | None:
-    """Return the nodata value of all bands of a raster, which a GeoTIFF has one of, or None.
+    """Return the nodata value common to all bands of a raster, or None.
+
+    A GeoTIFF has a single nodata value.
 
     Raises
     ------
@@ -227,7 +230,7 @@ def shared_nodata(source: RasterSource) -> float | None:
         hold the value.
     """
     declared = [source.bands[number - 1].nodata for number in source.image_bands]
-    # NaN holds no data, whether or not that is declared.
+    # NaN is nodata, whether or not it is declared.
     if len({None if value != value else value for value in declared}) > 1:
         listed = ", ".join("none" if value is None else f"{value:g}" for value in declared)
         raise ParameterError(
@@ -243,10 +246,10 @@ def shared_nodata(source: RasterSource) -> float | None:
 
 
 def chosen_nodata(source: RasterSource) -> float | None:
-    """Return the nodata value that a raster's new pixels are written with, or None.
+    """Return the nodata value for a raster's new pixels, or None.
 
-    It is what the raster declares; NaN for real floating-point pixels if nothing else marks those
-    without data. Errors as `shared_nodata`.
+    It is the declared value; for real floating-point pixels without declaration, alpha band or
+    mask, it is NaN. Errors as `shared_nodata`.
     """
     declared = shared_nodata(source)
     if declared is not None or source.alpha_band or source.has_mask_band:
@@ -255,7 +258,7 @@ def chosen_nodata(source: RasterSource) -> float | None:
 
 
 def different_masks(source: RasterSource) -> ParameterError:
-    """Return the error that bands hold no data at different pixels, which one mask cannot tell."""
+    """Return the error that bands lack data at different pixels, which one mask cannot express."""
     return ParameterError(
         f"bands of {source.path} hold no data at different pixels, and a GeoTIFF has one mask for "
         "all: give them a nodata value, or write them one by one"
@@ -263,7 +266,7 @@ def different_masks(source: RasterSource) -> ParameterError:
 
 
 def put_nodata(values: NDArray[Any], valid: Mask, nodata: float | None) -> None:
-    """Put the nodata value, 0 if there is none, where pixels are not valid, in place."""
+    """Set invalid pixels to the nodata value, or to 0 if there is none, in place."""
     fill = values.dtype.type(0 if nodata is None else nodata)
     if nodata is not None:
         keep_apart(values, fill)
@@ -271,9 +274,9 @@ def put_nodata(values: NDArray[Any], valid: Mask, nodata: float | None) -> None:
 
 
 def keep_apart(values: NDArray[Any], fill: Any) -> None:
-    """Change valid values that GDAL reads as the nodata value, in place, by the least step.
+    """Change values that GDAL would read as nodata by the smallest possible step, in place.
 
-    It compares real parts.
+    Complex values are compared by their real parts.
     """
     part, nodata = values.real, fill.real
     if part.dtype.kind != "f":
