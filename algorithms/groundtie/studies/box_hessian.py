@@ -1,8 +1,8 @@
 """The determinant of the Hessian by box filters on the integral image ([Bay2008]).
 
 Second derivatives of a Gaussian are approximated by a few boxes; a box of any size costs four
-values of the integral image. All boxes of a filter share sums over rows, and the work is done on
-strips of rows that stay in the processor's cache.
+values of the integral image. Boxes of a filter share sums over rows, and the work is done on strips
+of rows that stay in the processor's cache.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _call(task: partial[None]) -> None:
 
 
 def _fill(integral: IntegralImage, side: int, step: int, strip: slice, out: FloatImage) -> None:
-    """Compute the rows `strip` of `out`, except where the filter extends beyond the columns."""
+    """Compute the rows `strip` of `out`, except columns where the filter leaves the image."""
     lobe, half = side // 3, side // 2
     middle = lobe // 2
     width = integral.shape[1] - 1
