@@ -95,7 +95,7 @@ def source_files(folder: Path) -> Iterator[Path]:
 
 
 def requirements(pyproject: Path) -> str:
-    """Write the package's dependencies as pip's requirements file."""
+    """Return the package's dependencies as the text of a pip requirements file."""
     project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
     return "".join(f"{dependency}\n" for dependency in project["dependencies"])
 

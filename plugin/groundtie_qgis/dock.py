@@ -19,7 +19,7 @@ from .translation import tr
 
 
 class GroundTieDock(QDockWidget):
-    """Guides from two layers to a registered image that has been inspected.
+    """Guides the user from two layers to a registered and inspected image.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class AttitudeOptions:
     rotation_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.shift_m < 0 or self.drift_px < 0 or abs(self.rotation_deg) > 1:
             raise ParameterError(
                 "shift and drift must not be negative, the rotation of a sensor at most 1°"

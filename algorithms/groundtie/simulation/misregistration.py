@@ -59,7 +59,7 @@ class DistortionOptions:
     warp_px: float = 4.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.kind not in DISTORTIONS:
             names = ", ".join(DISTORTIONS)
             raise ParameterError(f"distortion must be one of {names}, not {self.kind!r}")

@@ -62,7 +62,7 @@ class OpticalOptions:
     noise_dn: float = 4.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if not 10 <= self.sun_elevation_deg <= 90:
             raise ParameterError(
                 f"sun_elevation_deg must be 10 to 90, not {self.sun_elevation_deg}"

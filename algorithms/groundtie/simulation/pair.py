@@ -71,7 +71,7 @@ class PairOptions:
     terrain_error_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.input not in INPUTS:
             raise ParameterError(f"input must be one of {', '.join(INPUTS)}, not {self.input!r}")
         if self.terrain_error_m < 0:

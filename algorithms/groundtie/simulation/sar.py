@@ -61,7 +61,7 @@ class SarOptions:
     amplitude_at_0_db: float = 2000.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if not 10 <= self.incidence_deg <= 70:
             raise ParameterError(f"incidence_deg must be 10 to 70, not {self.incidence_deg}")
         if self.orbit not in ORBITS:

@@ -68,7 +68,7 @@ class SceneOptions:
     slope_deg: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if min(self.size_px) < 16:
             raise ParameterError(
                 f"the scene must be at least 16 px wide and high, not {self.size_px}"
@@ -240,7 +240,7 @@ def _octaves(options: SceneOptions) -> list[tuple[float, float]]:
 
 
 def _widest_m(sigma_m: float, steep: float, octaves: int) -> float:
-    """Return the widest spacing of octaves that together have slopes of deviation `steep`."""
+    """Return the widest spacing at which the slopes of all octaves have deviation `steep`."""
     return _SLOPE_OF_SPLINES * sigma_m * math.sqrt(octaves) / steep
 
 

@@ -57,7 +57,7 @@ class SensorOptions:
     altitude_m: float = 681_000.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.optical.off_nadir_deg > 45:
             raise ParameterError("the camera must look down by 45° or more steeply")
 

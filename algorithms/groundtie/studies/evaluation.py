@@ -98,7 +98,7 @@ class Consistency:
         return cls(len(first), (float(std[0]), float(std[1])), by_class)
 
     def summary(self) -> dict[str, Any]:
-        """Return the values as JSON can carry them."""
+        """Return JSON-compatible values."""
         known = np.isfinite(self.std_px).all()
         return {
             "matches": self.matches,
@@ -134,7 +134,7 @@ class Evaluation:
     matching_s: float
 
     def summary(self) -> dict[str, Any]:
-        """Return the values as JSON can carry them."""
+        """Return JSON-compatible values."""
         return {
             "variant": self.variant,
             "detections": list(self.detections),

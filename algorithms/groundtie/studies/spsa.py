@@ -134,7 +134,7 @@ def _climb(
     rng: np.random.Generator,
     uphill: Callable[[Measure, FloatArray, _Slopes], FloatArray],
 ) -> Place:
-    """Step uphill until `PATIENCE` evaluations have not noticeably improved the best value."""
+    """Step uphill until `PATIENCE` evaluations in a row bring no noticeable improvement."""
     best, mark, waited = start, similarity(start), 0
     slopes = _Slopes(len(start))
 

@@ -223,7 +223,7 @@ class SurfaceSettings:
             self.gpve_order,
             context,
         )
-        # Powers of shares: the surface would be flat, or infinite.
+        # Powers of shares overflow or underflow: the surface would be infinite or flat.
         if self.similarity == "tsallis" and not (np.isfinite(values).all() and values.any()):
             raise ParameterError(
                 f"Tsallis' entropy of order {self.entropy_order:g} has values here that are beyond "
