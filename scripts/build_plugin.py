@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from scripts.help_pages import can_make_pages, help_pages
 
 TOP = "groundtie_qgis"
-# The oldest date that a zip can hold: the same tree gives the same bytes on every day.
+# The oldest date that a zip can hold; a fixed date makes builds of the same tree identical.
 DATE = (1980, 1, 1, 0, 0, 0)
 NO_PAGES = "without the pages of its help, which need the package markdown-it-py to be built"
 
@@ -50,7 +50,7 @@ def build(root: Path, target: Path) -> Path:
         with zipfile.ZipFile(part, "w") as archive:
             for name in sorted(contents):
                 info = zipfile.ZipInfo(f"{TOP}/{name}", DATE)
-                info.create_system = 3  # Unix, wherever it is built
+                info.create_system = 3  # Unix, whatever the build system
                 info.external_attr = 0o100644 << 16
                 archive.writestr(info, contents[name], zipfile.ZIP_DEFLATED, 9)
         os.replace(part, target)
@@ -60,7 +60,7 @@ def build(root: Path, target: Path) -> Path:
 
 
 def collect(root: Path) -> dict[str, bytes]:
-    """Read what goes into the plugin's folder, by its name in there."""
+    """Read the contents of the plugin's folder, by their names in it."""
     plugin, library = root / "plugin" / TOP, root / "algorithms" / "groundtie"
     for package in (plugin, library):
         if not (package / "__init__.py").is_file():
@@ -95,13 +95,13 @@ def source_files(folder: Path) -> Iterator[Path]:
 
 
 def requirements(pyproject: Path) -> str:
-    """Write the package's dependencies as pip's requirements file."""
+    """Return the package's dependencies as the text of a pip requirements file."""
     project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
     return "".join(f"{dependency}\n" for dependency in project["dependencies"])
 
 
 def obstacles(root: Path) -> list[str]:
-    """Return why a tree cannot be released: what is still a placeholder, or cannot be made."""
+    """Return why a tree cannot be released: placeholders, or help pages that cannot be built."""
     parser = configparser.ConfigParser(interpolation=None)
     parser.read(root / "metadata.txt", encoding="utf-8")
     general = parser["general"]

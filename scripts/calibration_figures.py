@@ -1,4 +1,4 @@
-"""The figure on calibration, from the runs of the suite of that name that are kept beside it."""
+"""The figure on calibration, from stored runs of the calibration suite."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from scripts.drawing import BLUE, GREEN, GREY, ORANGE, FloatArray, Scenes, canvas
 
-# Of each run: its class, and the shares of places within CE50, CE90 and CE95.
+# For each run: its class, and the shares of places within CE50, CE90 and CE95.
 RUNS = Path(__file__).resolve().parents[1] / "docs" / "figures" / "calibration.json"
 
 _SAID = (0.5, 0.9, 0.95)
@@ -39,7 +39,7 @@ def calibration(_: Scenes) -> Figure:
     shown = [name for name in _STYLES if len(classes.get(name, ())) >= _FEWEST_RUNS]
     for number, name in enumerate(shown):
         colour, marker = _STYLES[name]
-        # Beside one another, so that no class hides another.
+        # Offset horizontally, so that no class hides another.
         said = np.array(_SAID) + 0.006 * (number - (len(shown) - 1) / 2)
         shares = classes[name]
         label = f"{name} ({len(shares)})"
@@ -56,7 +56,7 @@ def calibration(_: Scenes) -> Figure:
 
 
 def observed(path: Path) -> dict[str, FloatArray]:
-    """Return of each class the shares within the radii, shape (runs, 3)."""
+    """Return the shares within the radii for each class, shape (runs, 3)."""
     classes = defaultdict(list)
     for run in json.loads(path.read_text(encoding="utf-8")):
         classes[run["group"]].append(run["within"])

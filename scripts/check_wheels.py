@@ -1,6 +1,6 @@
-"""Ask pip whether what *Install what is missing* installs exists for the Pythons of other QGIS.
+"""Check by pip that the packages of *Install what is missing* exist for the Pythons of other QGIS.
 
-Needs the network; nothing is installed.
+It needs the network and installs nothing.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ PLATFORMS = {
     "macOS, Intel": ("macosx_10_9_x86_64", "macosx_12_0_x86_64", "macosx_14_0_x86_64"),
     "macOS, Apple": ("macosx_11_0_arm64", "macosx_12_0_arm64", "macosx_14_0_arm64"),
 }
-# A numpy 1 and a numpy 2 that a QGIS with this Python may have: the plugin keeps QGIS's own.
+# A numpy 1 and a numpy 2 that QGIS may have with each Python; the plugin keeps QGIS's numpy.
 NUMPYS = {"3.10": ("1.26.4", "2.2.6"), "3.12": ("1.26.4", "2.2.6")}
 
 
 @dataclass(frozen=True)
 class Target:
-    """A QGIS elsewhere: its system, Python and numpy."""
+    """A QGIS on another system: its platform, Python and numpy."""
 
     system: str
     python: str
@@ -53,7 +53,7 @@ def targets() -> Iterator[Target]:
 
 
 def resolved(target: Target) -> str:
-    """Return what pip would install for a target, or its reason why it cannot."""
+    """Return the packages that pip would install for a target, or the reason why it cannot."""
     called = subprocess.run(target.command(), capture_output=True, text=True, check=False)
     if called.returncode:
         return f"FAILED: {called.stderr.strip().splitlines()[-1]}"

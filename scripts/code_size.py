@@ -13,7 +13,7 @@ from groundtie.tools import load_tools
 
 PACKAGE = Path(__file__).resolve().parents[1] / "algorithms" / "groundtie"
 
-# What is out of the product's way: simulators and studies, with their tools.
+# Code that is separate from the product: simulators and studies, with their tools.
 APART = ("simulation", "studies")
 APART_TOOLS = ("simulate", "similarity_surface", "detector_repeatability")
 
@@ -29,7 +29,7 @@ _CONSTANT = re.compile(r"^_?[A-Z][A-Z0-9_]+(: [\w\[\]]+)? = -?[0-9.]", re.MULTIL
 
 
 def code_lines(source: str) -> int:
-    """Return how many lines of a module hold code."""
+    """Return the number of lines of code in a module."""
     documented: set[int] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):

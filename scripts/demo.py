@@ -13,7 +13,7 @@ import numpy as np
 import groundtie
 from groundtie.errors import GroundTieError
 
-# What the demonstration promises: the default limit that `coregister` sets on itself.
+# Limit of the demonstration's error: the default limit of `coregister`.
 MAX_ERROR_PX = 3.0
 
 Mapping = Callable[[np.ndarray], np.ndarray]
@@ -25,7 +25,7 @@ def errors_against_truth_px(transform: Mapping, check_points: Path) -> np.ndarra
     Parameters
     ----------
     transform : callable
-        Reference map positions, float64 shape (n, 2), to input pixels (col, row).
+        Maps reference map positions, float64 shape (n, 2), to input pixels (col, row).
     check_points : Path
         CSV with the columns reference_x, reference_y, input_col and input_row.
 
@@ -45,7 +45,7 @@ def errors_against_truth_px(transform: Mapping, check_points: Path) -> np.ndarra
 
 
 def describe_verdict(numbers: dict) -> str:
-    """Say in one line what the report's JSON says of a registration that was accepted."""
+    """Summarise in one line the report's JSON of an accepted registration."""
     verdict = numbers["verdict"]
     return (
         f"accepted: {verdict['points']} tie points, held-out RMSE "
@@ -95,7 +95,7 @@ def main() -> int:
     except GroundTieError as error:
         print(f"The demonstration failed: {error.one_line()}")
         return error.exit_code
-    # Not `>`: an error that is not a number is no success.
+    # `not <=` instead of `>`, so that NaN counts as a failure.
     if not rmse_px <= MAX_ERROR_PX:
         print(f"The registration was accepted but is off by more than {MAX_ERROR_PX} px.")
         return 1

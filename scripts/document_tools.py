@@ -36,17 +36,17 @@ RULES_BEGIN, RULES_END = "<!-- rules -->", "<!-- /rules -->"
 
 
 def page_of(tool: Tool, folder: Path) -> Path:
-    """Return the page of a tool."""
+    """Return the path of a tool's page."""
     return folder / f"{tool.name.replace('_', '-')}.md"
 
 
 def document(tools: Sequence[Tool], folder: Path) -> list[Path]:
-    """Bring the tables on the pages of some tools up to date.
+    """Update the tables on the pages of the given tools.
 
     Parameters
     ----------
     tools
-        The tools; each has its page in the folder.
+        The tools; each has a page in the folder.
     folder
         Folder of the pages.
 
@@ -60,20 +60,20 @@ def document(tools: Sequence[Tool], folder: Path) -> list[Path]:
     FileNotFoundError
         A tool has no page.
     ValueError
-        A page does not have the place of the tables marked once.
+        A page does not mark the place of the tables exactly once.
     """
     paths = {page_of(tool, folder): tables(tool) for tool in tools}
     return [path for path, text in paths.items() if _update(path, text)]
 
 
 def document_rules(rules: Mapping[str, Sequence[Rule]], folder: Path) -> list[Path]:
-    """Bring the table of rules on the verdict's page up to date; as `document`."""
+    """Update the table of rules on the verdict's page; otherwise like `document`."""
     path = folder / RULES_PAGE
     return [path] if _update(path, rule_table(rules), RULES_BEGIN, RULES_END) else []
 
 
 def _update(path: Path, text: str, begin: str = BEGIN, end: str = END) -> bool:
-    """Put a text between the marks of a page, and return whether it is another one."""
+    """Put a text between the marks of a page, and return whether this changed the page."""
     page = path.read_text(encoding="utf-8")
     updated = with_tables(page, text, path.name, begin, end)
     if updated != page:
@@ -82,7 +82,7 @@ def _update(path: Path, text: str, begin: str = BEGIN, end: str = END) -> bool:
 
 
 def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = END) -> str:
-    """Return a page with `text` between the marks; `name` is the page's in the error message."""
+    """Return a page with `text` between the marks; `name` is the page's name in errors."""
     before, found_begin, rest = page.partition(begin)
     _, found_end, after = rest.partition(end)
     if not found_begin or not found_end or begin in after or end in before + after:
@@ -91,7 +91,7 @@ def with_tables(page: str, text: str, name: str, begin: str = BEGIN, end: str = 
 
 
 def rule_table(rules: Mapping[str, Sequence[Rule]]) -> str:
-    """Return the table of rules, in the order in which they are asked."""
+    """Return the table of rules, in the order in which they are applied."""
     rows = [
         (r.name, stage, r.refuses, r.source, r.advice, "nothing" if r.is_final else "another way")
         for stage, of_stage in rules.items()
@@ -102,7 +102,7 @@ def rule_table(rules: Mapping[str, Sequence[Rule]]) -> str:
 
 
 def tables(tool: Tool) -> str:
-    """Return the tables of a tool's parameters and of the numbers that it gives to QGIS."""
+    """Return the tables of a tool's parameters and of its output values in QGIS."""
     plain = [p for p in tool.parameters if not p.kind.advanced]
     advanced = [p for p in tool.parameters if p.kind.advanced]
     parts = [
@@ -141,7 +141,7 @@ def _rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def values(kind: Kind) -> str:
-    """Return which values a parameter of this kind takes."""
+    """Return the values that a parameter of this kind accepts."""
     if isinstance(kind, Number):
         what = "whole number" if kind.integer else "number"
         bounds = f"{kind.range_text} {kind.unit}".strip()
@@ -165,7 +165,7 @@ def values(kind: Kind) -> str:
 
 
 def default(parameter: Parameter) -> str:
-    """Return which value a parameter has if none is given."""
+    """Return the value of a parameter if none is given."""
     if parameter.required:
         return "required"
     if isinstance(parameter.kind, Flag):

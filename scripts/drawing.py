@@ -1,4 +1,4 @@
-"""What the figures of the documentation share: scenes, colours, axes, and how they are written."""
+"""Shared parts of the documentation's figures: scenes, colours, axes and output."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import groundtie
 
 BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#7a7a7a"
 
-# Colours are blended with white and black in so many steps: few colours make small files.
+# Grey levels, and steps in blends of colours with white and black: few colours make small files.
 _GREYS, _BLENDS = 22, 6
 
 FloatArray = NDArray[np.floating[Any]]
@@ -28,7 +28,7 @@ FloatArray = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class Scenes:
-    """Simulated scenes in a folder, made when they are asked for first."""
+    """Simulated scenes in a folder, made on first use."""
 
     folder: Path
 
@@ -41,7 +41,7 @@ class Scenes:
         return self._pair("city", size=400, density="city", looks=4, seed=3)
 
     def large_city(self) -> Path:
-        """Return the folder of one of 1000 px, as masks of the ground go by the whole scene."""
+        """Return the folder of a city of 1000 px, as ground masks depend on the whole scene."""
         return self._pair("large-city", size=1000, density="city", seed=225)
 
     def speckled(self) -> Path:
@@ -73,7 +73,7 @@ def canvas(width: float, height: float, count: int, rows: int = 1) -> tuple[Figu
 
 
 def framed(axes: Axes) -> None:
-    """Give axes a frame without ticks, and pixels as wide as high."""
+    """Give axes a frame without ticks, and square pixels."""
     axes.axis("on")
     axes.set(xticks=[], yticks=[])
     axes.set_aspect("equal")
@@ -85,7 +85,7 @@ def draw_surface(
     true_px: tuple[float, float],
     peak_px: tuple[float, float] | None = None,
 ) -> None:
-    """Draw a surface over shifts; the true shift as a cross, the peak as a circle."""
+    """Draw a surface over shifts, with the true shift as a cross and the peak as a circle."""
     radius = values.shape[0] // 2
     extent = (-radius - 0.5, radius + 0.5, radius + 0.5, -radius - 0.5)
     low, high = np.quantile(values, 0.02), values.max()
@@ -99,7 +99,7 @@ def draw_surface(
 def draw_arrows(
     axes: Axes, position: FloatArray, vector: FloatArray, stretch: float, colour: str
 ) -> Any:
-    """Draw vectors at positions, both of shape (n, 2), so many times as long."""
+    """Draw vectors at positions, both of shape (n, 2), lengthened by a factor."""
     return axes.quiver(
         *position.T, *(vector * stretch).T, angles="xy", scale_units="xy", scale=1, color=colour,
         width=0.005,
@@ -113,13 +113,13 @@ def read_band(path: Path, number: int = 1) -> FloatArray:
 
 
 def stretched(image: FloatArray) -> FloatArray:
-    """Return an image from 0 to 1, without its darkest and brightest 2 %."""
+    """Return an image stretched to 0–1, with its darkest and brightest 2 % saturated."""
     low, high = np.quantile(image, (0.02, 0.98))
     return np.asarray(np.clip((image - low) / (high - low), 0, 1))
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table, by the names of its columns."""
+    """Return the rows of a CSV table, each by column names."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
@@ -130,7 +130,7 @@ def columns(rows: list[dict[str, str]], *names: str) -> FloatArray:
 
 
 def write(figure: Figure, path: Path) -> None:
-    """Write a figure with few colours, which keeps it small."""
+    """Write a figure with few colours, which keeps the file small."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", facecolor="white", bbox_inches="tight", pad_inches=0.05)
     image = Image.open(buffer).convert("RGB")
@@ -138,7 +138,7 @@ def write(figure: Figure, path: Path) -> None:
 
 
 def _palette() -> Image.Image:
-    """Return greys, and the colours of the figures from dark to pale, as an image's palette."""
+    """Return a palette image of greys and of the figures' colours from dark to pale."""
     colours = [[level] * 3 for level in np.linspace(0, 255, _GREYS)]
     for name in (BLUE, ORANGE, GREEN):
         pure = np.array([int(name[k : k + 2], 16) for k in (1, 3, 5)])

@@ -1,4 +1,4 @@
-"""Figures on what is matched: keypoints, directions, masks."""
+"""Figures on the image content that is matched: keypoints, gradient directions, masks."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from scripts.drawing import BLUE, GREY, ORANGE, FloatArray, Scenes, canvas, read
 
 
 def features(scenes: Scenes) -> Figure:
-    """Keypoints of SIFT on a radar image, by octave."""
+    """SIFT keypoints on a radar image, by octave."""
     values = read_band(scenes.speckled() / "reference.tif")[20:110, 60:180]
     window = Patch(values.astype(np.float32), np.ones(values.shape, bool))
     figure, axes = canvas(5.8, 2.5, 2)
     for each, name in zip(axes, ("sift", "sift-oct"), strict=True):
         found = sift_detector(name).detect(window)
-        # Half a layer below the first one of the image at its own size.
+        # The first octave ends half a layer below the first layer at the original image size.
         first = found.scale_px < FIRST_SCALE_PX * 2 ** (1 / 6)
         each.imshow(stretched(np.log(values + 1.0)), cmap="gray")
         for chosen, colour in ((first, ORANGE), (~first, BLUE)):
@@ -42,7 +42,7 @@ def features(scenes: Scenes) -> Figure:
 
 
 def hog(scenes: Scenes) -> Figure:
-    """One patch in red and near infrared, and the histograms of their directions."""
+    """One patch in red and near infrared, and its histograms of gradient directions."""
     row, col = 88, 76
     patches = [
         read_band(scenes.rural() / "input.tif", number)[row - 20 : row + 21, col - 20 : col + 21]
@@ -57,7 +57,7 @@ def hog(scenes: Scenes) -> Figure:
 
 
 def masks(scenes: Scenes) -> Figure:
-    """A radar image of a city, two masks of it, and open ground of the country."""
+    """A radar image of a city, two masks of it, and open ground in a rural scene."""
     radar = scenes.large_city() / "reference.tif"
     figure, axes = canvas(8, 2.3, 4)
     window = np.s_[120:420:2, 200:500:2]
@@ -95,7 +95,7 @@ def _draw_mask(axes: Axes, grey: FloatArray, taken: NDArray[np.bool_], title: st
 
 
 def surface_model(scenes: Scenes) -> Figure:
-    """What of a city's ground radar and camera do not show, by its surface model."""
+    """Parts of a city's ground that radar and camera do not show, by its surface model."""
     folder, window = scenes.city(), np.s_[90:310:2, 90:310:2]
     files = [scenes.folder / f"{name}.tif" for name in ("surface", "reasons", "aligned")]
     radar, camera = folder / "reference.tif", folder / "input.tif"
@@ -135,7 +135,7 @@ def surface_model(scenes: Scenes) -> Figure:
 
 
 def _draw_histograms(axes: Axes, histograms: FloatArray) -> None:
-    """Draw the directions of 3 × 3 cells as bars through the cells' middles."""
+    """Draw the directions of 3 × 3 cells as bars through the cell centres."""
     for row in range(3):
         for col in range(3):
             for number, value in enumerate(histograms[row, col]):
@@ -150,7 +150,7 @@ def _draw_histograms(axes: Axes, histograms: FloatArray) -> None:
 
 
 def _histograms(patch: FloatArray) -> FloatArray:
-    """Return directions without sign in 3 × 3 cells, shape (3, 3, 9)."""
+    """Return histograms of unsigned directions in 3 × 3 cells, shape (3, 3, 9)."""
     smooth = cv2.GaussianBlur(patch, (0, 0), 2.0)
     down, right = np.gradient(smooth)
     number = ((np.rad2deg(np.arctan2(down, right)) % 180) // 20).astype(int)

@@ -46,7 +46,7 @@ _PAGE = """<!DOCTYPE html>
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its file, title, the anchors of its headings, its links, and what it shows."""
+    """A page: its file, title, heading anchors, links and content."""
 
     source: Path
     title: str
@@ -56,7 +56,7 @@ class Page:
 
 
 def can_make_pages() -> bool:
-    """Whether the package that reads Markdown is there."""
+    """Whether the Markdown package is installed."""
     try:
         import markdown_it  # noqa: F401
     except ImportError:
@@ -65,15 +65,14 @@ def can_make_pages() -> bool:
 
 
 def help_pages(docs: Path) -> dict[str, bytes]:
-    """Return the pages of a folder of Markdown, the README above it and its figures, by name.
+    """Return the pages of a Markdown folder and its parent's README, and its figures, by name.
 
-    Links between pages lead from page to page; those to other files of the repository are plain
-    text.
+    Links between pages are kept; links to other files of the repository become plain text.
 
     Raises
     ------
     ValueError
-        Links lead nowhere, or pages are not in the navigation.
+        Links are broken, or pages are not in the navigation.
     """
     sources = {path.resolve(): f"{path.stem}.html" for path in sorted(docs.glob("*.md"))}
     readme = (docs.parent / "README.md").resolve()
@@ -119,9 +118,9 @@ def _page(source: Path, sources: dict[Path, str]) -> Page:
 def _with_links(
     tokens: list[Any], source: Path, sources: dict[Path, str], links: list[str]
 ) -> list[Any]:
-    """Return the tokens of a line with links to pages, and without those to other files.
+    """Return the tokens of a line with links to pages, and without links to other files.
 
-    What they lead to is added to `links`.
+    Targets among the pages, and missing files, are added to `links`.
     """
     kept, dropped = [], 0
     for token in tokens:
@@ -144,7 +143,7 @@ def _with_links(
 
 
 def _broken_links(pages: dict[str, Page]) -> list[str]:
-    """Return a line for each link that leads nowhere."""
+    """Return a line for each broken link."""
     faults = []
     for page in pages.values():
         for link in page.links:
@@ -155,7 +154,7 @@ def _broken_links(pages: dict[str, Page]) -> list[str]:
 
 
 def _sections(index: Path) -> dict[str, dict[str, str]]:
-    """Return the navigation: titles of pages by their names, in the index's sections."""
+    """Return the navigation: for each section of the index, page titles by page names."""
     sections: dict[str, dict[str, str]] = {}
     for part in index.read_text(encoding="utf-8").split("\n## ")[1:]:
         heading, _, text = part.partition("\n")

@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 if not __package__:
-    # Run as a file, Python looks for modules beside it; the scripts are a package.
+    # Run as a file: Python would look for modules beside it, but the scripts are a package.
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from scripts.calibration_figures import calibration

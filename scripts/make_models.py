@@ -1,6 +1,6 @@
 """Write the models that the plugin ships, plugin/groundtie_qgis/models/*.model3; needs QGIS.
 
-As the tests, it runs with QGIS's Python: QT_QPA_PLATFORM=offscreen /usr/bin/python3
+Like the tests, it runs with QGIS's Python: QT_QPA_PLATFORM=offscreen /usr/bin/python3
 scripts/make_models.py.
 """
 
@@ -25,12 +25,12 @@ class Step:
     Parameters
     ----------
     tool
-        Its name, which is the step's, too.
+        Name of the tool, which is also that of the step.
     inputs
-        Where values come from, by parameter: `name` of an input of the model, `tool.OUTPUT` of
-        another step, or `=value`.
+        Sources of values, by parameter: `name` of an input of the model, `tool.OUTPUT` of another
+        step, or `=value`.
     outputs
-        What the model gives back, by parameter of the tool: its description.
+        Descriptions of the model's outputs, by parameter of the tool.
     """
 
     tool: str
@@ -40,7 +40,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A model: its name, texts, inputs (makers of their definitions) and steps."""
+    """A model: its name, texts, inputs (functions that make their definitions) and steps."""
 
     name: str
     title: str
@@ -183,7 +183,7 @@ def words(label: str, choices: tuple[str, ...]) -> Callable[[str], Any]:
 
 
 def model(recipe: Recipe) -> Any:
-    """Return a model as QGIS has it."""
+    """Return the QGIS model of a recipe."""
     from qgis.core import QgsProcessingModelAlgorithm, QgsProcessingModelParameter
     from qgis.PyQt.QtCore import QPointF, QSizeF
 
@@ -221,7 +221,7 @@ def _child(step: Step) -> Any:
         if name in step.inputs:
             child.addParameterSources(name, [_source(step.inputs[name])])
         elif default is not None and not definition.isDestination():
-            # as the designer does: a model does not take defaults by itself
+            # as the designer does: a model does not apply defaults by itself
             child.addParameterSources(name, [_source(f"={default}")])
     outputs = {}
     for row, (name, text) in enumerate(step.outputs.items()):
@@ -245,12 +245,12 @@ def _source(text: str) -> Any:
 
 
 def write(folder: Path) -> list[Path]:
-    """Write all models into a folder; QGIS runs and has the provider.
+    """Write all models into a folder; QGIS must be running with the provider.
 
     Raises
     ------
     ValueError
-        A model is wrong.
+        A model is invalid.
     """
     paths = []
     for recipe in recipes():
@@ -265,7 +265,7 @@ def write(folder: Path) -> list[Path]:
 
 def main() -> int:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-    os.environ.setdefault("QT_HASH_SEED", "0")  # attributes in one order
+    os.environ.setdefault("QT_HASH_SEED", "0")  # a fixed order of attributes
     sys.path[:0] = [str(ROOT / "plugin"), str(ROOT / "algorithms")]
     from qgis.core import QgsApplication
 

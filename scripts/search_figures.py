@@ -1,4 +1,4 @@
-"""Figures on search: surfaces of similarity, coarse places, neighbours, rotation."""
+"""Figures on the search: similarity surfaces, coarse search, neighbours, rotation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from scripts.drawing import (
 
 
 def similarity(scenes: Scenes) -> Figure:
-    """Surfaces of one chip by four measures."""
+    """Similarity surfaces of one chip by four measures."""
     pair, surface = scenes.rural(), scenes.folder / "surface.tif"
     true_px = _true_shift_px(pair, 412130.5, 5333629.5)
     figure, axes = canvas(8, 2.35, 4)
@@ -71,7 +71,7 @@ def search(scenes: Scenes) -> Figure:
 
 
 def propagation(_: Scenes) -> Figure:
-    """Surfaces of chips alone and after belief propagation."""
+    """Similarity surfaces of chips, alone and after belief propagation."""
     rng = np.random.default_rng(5)
     side, radius, true = 7, 10, (3, -2)
     rows, cols = np.mgrid[-radius : radius + 1, -radius : radius + 1]
@@ -93,7 +93,7 @@ def propagation(_: Scenes) -> Figure:
 
 
 def rotation(scenes: Scenes) -> Figure:
-    """Height of the best shift over rotation, and the images under the pose found."""
+    """Peak height of the best shift over rotation, and the images under the pose found."""
     angle_deg = 40.0
     reference = _reduced(np.log(read_band(scenes.rural() / "reference.tif") + 1.0))
     upright = _reduced(read_band(scenes.rural() / "input.tif", 3)[:500, :500])
@@ -119,7 +119,7 @@ def rotation(scenes: Scenes) -> Figure:
 
 
 def _draw_displacements(axes: Axes, pair: Path, points: Path) -> None:
-    """Draw by how much tie points and check points are displaced, five times as long."""
+    """Draw the displacements of tie points and check points, five times as long."""
     rows = [row for row in read_rows(points) if row["state"] == "used"]
     with rasterio.open(pair / "reference.tif") as source:
         to_pixel, bounds = ~source.transform, (source.width, source.height)
@@ -139,7 +139,7 @@ def _draw_displacements(axes: Axes, pair: Path, points: Path) -> None:
 
 
 def _true_shift_px(pair: Path, x: float | None, y: float | None) -> tuple[float, float]:
-    """Return how far right and down the input's nominal position of a place is."""
+    """Return the shift (right, down) of a place's nominal position in the input."""
     with rasterio.open(pair / "reference.tif") as source:
         pixel_m = source.transform.a
         middle = source.transform @ (source.width / 2, source.height / 2)
@@ -162,7 +162,7 @@ def _highest(values: FloatArray, count: int) -> list[tuple[int, int]]:
 
 
 def _best_height(reference: FloatArray, other: FloatArray) -> float:
-    """Return how high the best shift of two squared orientation fields is."""
+    """Return the robust peak height of the best shift of two squared orientation fields."""
     spectra = [np.fft.fft2(_orientation(image)) for image in (reference, other)]
     surface = np.real(np.fft.ifft2(spectra[0].conj() * spectra[1]))
     spread = 1.4826 * np.median(np.abs(surface - np.median(surface)))

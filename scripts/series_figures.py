@@ -1,4 +1,4 @@
-"""The figure on series: a network of registrations, and what its adjustment finds."""
+"""The figure on series: a network of registrations and its adjustment."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Keep the plugin's translations complete: plugin/groundtie_qgis/i18n/*.ts, for Qt Linguist.
 
-New texts are added as unfinished, texts that are gone are taken out. Texts are those that the
-plugin's source hands to `tr` or `mark`, and those of the tools' declarations and the models.
+New texts are added as unfinished, obsolete ones are removed. Texts are the arguments of `tr` and
+`mark` in the plugin's source, and the texts of the tools' declarations and of the models.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CONTEXT = "GroundTie"
 
 
 def texts() -> list[str]:
-    """Return all texts that are translated, sorted."""
+    """Return all texts to translate, sorted."""
     found = {*_of_source(), *_of_declarations(), *_of_models()}
     return sorted(found - {""})
 
@@ -51,7 +51,7 @@ def _of_declarations() -> Iterator[str]:
 
 
 def plugin_module(name: str) -> ModuleType:
-    """Import a module of the plugin that needs no QGIS, without the plugin, which does."""
+    """Import a module that needs no QGIS, bypassing the plugin's package, which needs it."""
     spec = importlib.util.spec_from_file_location(name, PLUGIN / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -69,7 +69,7 @@ def _of_models() -> Iterator[str]:
 
 
 def write(path: Path, translations: dict[str, str], wanted: list[str]) -> int:
-    """Write the wanted texts with their translations; return how many have none."""
+    """Write the wanted texts with their translations; return the number without one."""
     root = ElementTree.Element("TS", version="2.1", language=path.stem.rpartition("_")[2])
     context = ElementTree.SubElement(root, "context")
     ElementTree.SubElement(context, "name").text = _CONTEXT

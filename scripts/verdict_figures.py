@@ -1,4 +1,4 @@
-"""Figures on the pipeline, on how it is checked, and on RPCs."""
+"""Figures on the pipeline, its checks, and RPCs."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from scripts.drawing import (
 
 
 def pipeline(_: Scenes) -> Figure:
-    """The stages of a registration and what flows between them."""
+    """The stages of a registration and the data that flow between them."""
     stages = (
         ("inspect", "what the images are", "SceneInfo"),
         ("mask", "what takes part", "masks"),
@@ -114,7 +114,7 @@ def rpc(scenes: Scenes) -> Figure:
 
 
 def verdict(_: Scenes) -> Figure:
-    """The held-out layout, and how likely agreement by chance is."""
+    """The layout of held-out check points, and the probability of agreement by chance."""
     figure, axes = canvas(8, 3.3, 2)
     share, chip, check = 0.6, 0.38, 0.54
     for col, row in np.ndindex(4, 4):
@@ -150,7 +150,7 @@ def verdict(_: Scenes) -> Figure:
 
 
 def survey(scenes: Scenes) -> Figure:
-    """Chips of an image of which a part lies off, and content that two images share."""
+    """Chips of an image with a displaced part, and an overlay in both images."""
     figure, axes = canvas(8, 3.6, 2)
     image = 255 * stretched(read_band(scenes.rural() / "input.tif"))
     moved = image.copy()
@@ -178,7 +178,7 @@ def survey(scenes: Scenes) -> Figure:
 
 
 def _surveyed(reference: FloatArray, input: FloatArray) -> Survey:
-    """Survey two arrays of one place around no shift at all."""
+    """Survey two arrays of the same ground about shift 0."""
     rasters = [
         Raster(image.astype(np.float32), Affine(1, 0, 0, 0, -1, 0), "EPSG:32633")
         for image in (reference, input)

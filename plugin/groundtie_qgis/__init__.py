@@ -12,7 +12,7 @@ OLDEST_PYTHON = (3, 10)
 def classFactory(iface: Any) -> Any:
     """Return the plugin (called by QGIS; `iface` is None without a desktop)."""
     if sys.version_info < OLDEST_PYTHON:
-        # Nothing else can be imported there.
+        # An older Python cannot import the other modules.
         from .old_python import OldPython
 
         return OldPython(iface, OLDEST_PYTHON)

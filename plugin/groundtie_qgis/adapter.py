@@ -1,4 +1,4 @@
-"""Turns any tool's declaration into a Processing algorithm."""
+"""Makes a Processing algorithm from any tool's declaration."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class ToolAlgorithm(NamedAlgorithm):
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
         if isinstance(self._tool, LazyTool) and not self._tool.loaded():
-            return  # the provider's own: what runs, or shows a dialog, is made from it
+            return  # the provider's own instance, from which those for runs and dialogs are made
         for parameter in self._tool.parameters:
             made = definition(parameter)
             made.setHelp(in_words(tr(parameter.kind.help), self._tool))
@@ -85,7 +85,7 @@ class ToolAlgorithm(NamedAlgorithm):
         valid, message = super().checkParameterValues(parameters, context)
         if not valid:
             return valid, message
-        scratch = QgsProcessingContext()  # so that a mere check has no layer loaded afterwards
+        scratch = QgsProcessingContext()  # so that a mere check does not load layers
         try:
             given = with_layers_as_files(self, self._tool, parameters, context)
             inputs = Reader(self, given, context, QgsProcessingFeedback())
@@ -101,7 +101,7 @@ class ToolAlgorithm(NamedAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> bool:
-        # Layers live in this thread, and must not be touched in that of `processAlgorithm`.
+        # Layers belong to this thread and must not be touched in that of `processAlgorithm`.
         try:
             given = with_layers_as_files(self, self._tool, parameters, context)
             self._inputs = self._read(Reader(self, given, context, feedback), written=False)
@@ -137,9 +137,9 @@ class ToolAlgorithm(NamedAlgorithm):
             feedback.pushDebugInfo(traceback.format_exc())
             what = f"{type(error).__name__}: {error}"
             raise QgsProcessingException(f"this is a bug in GroundTie: {what}") from error
-        # A batch in which rows failed ran to its end, but not to a good one.
+        # A batch can run to its end although rows of it failed.
         bad = getattr(result, "exit_code", 0) != 0
-        # The dock tells results from steps.
+        # The dock distinguishes results from progress messages.
         push = getattr(feedback, "pushResult", feedback.pushInfo)
         for line in result.lines():
             feedback.reportError(line) if bad else push(line)
@@ -147,7 +147,7 @@ class ToolAlgorithm(NamedAlgorithm):
         return self._results(values, result.summary())
 
     def _read(self, reader: Reader, *, written: bool) -> dict[str, Any]:
-        """Return the values of what is written, or of all the other parameters."""
+        """Return the values of the outputs, or of all other parameters."""
         return {
             parameter.name: reader.read(parameter)
             for parameter in self._tool.parameters
@@ -163,7 +163,7 @@ class ToolAlgorithm(NamedAlgorithm):
         return values
 
     def _show_reports(self, values: dict[str, Any], feedback: QgsProcessingFeedback) -> None:
-        """Show the report on what was refused: QGIS shows none of a run that failed."""
+        """Show the report of a refused run, as QGIS lists no outputs of failed runs."""
         for parameter in self._tool.parameters:
             kind, path = parameter.kind, values[parameter.name]
             if isinstance(kind, kinds.FileOut) and ".html" in kind.suffixes and path is not None:
@@ -171,7 +171,7 @@ class ToolAlgorithm(NamedAlgorithm):
                 show_report(tr("{}: refused").format(self.displayName()), path)
 
     def _finish_layers(self, values: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Have the layers that are loaded styled and grouped."""
+        """Arrange for loaded layers to be styled and grouped."""
         title = self.displayName()
         layers = LoadedLayers(f"{title}: {self._about}" if self._about else title)
         for parameter in self._tool.parameters:
@@ -194,7 +194,7 @@ class ToolAlgorithm(NamedAlgorithm):
 
 
 def _setting(parameter: Any) -> int | None:
-    """Return what QGIS's settings state of a common parameter; None: nothing."""
+    """Return the value that QGIS's settings give a common parameter; None: no value."""
     if parameter.name != "workers":
         return None
     most = QgsApplication.maxThreads()
@@ -202,7 +202,7 @@ def _setting(parameter: Any) -> int | None:
 
 
 def _progress(feedback: QgsProcessingFeedback) -> Any:
-    """Return the library's progress that reports to QGIS and hears its Cancel."""
+    """Return a progress of the library that reports to QGIS and obeys its Cancel button."""
     last_message = ""
 
     def report(fraction: float, message: str) -> None:

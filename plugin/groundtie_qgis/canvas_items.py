@@ -1,4 +1,4 @@
-"""What the dock draws on the map: images over it, up to a line, and tie points."""
+"""Map items that the dock draws: images over the map, up to a swipe line, and tie points."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _OFF = QColor("#8c8c8c")
 
 
 def clearly(layer: Any) -> Any:
-    """Return a layer to look at: one band of grey without the brightest, which hide the rest.
+    """Return a layer for viewing; a single grey band is stretched without its extremes.
 
-    A radar image between its least and its largest value is black.
+    Stretched from minimum to maximum, a radar image would be almost black.
     """
     if not isinstance(layer, QgsRasterLayer) or layer.renderer().type() != "singlebandgray":
         return layer
@@ -37,19 +37,19 @@ def clearly(layer: Any) -> Any:
 
 
 def top_left(canvas: QgsMapCanvas) -> QgsPointXY:
-    """Return the place in the map's top left corner: not that of its extent where it is rotated."""
+    """Return the map position of the top left corner, also where the map is rotated."""
     return canvas.getCoordinateTransform().toMapCoordinates(0, 0)
 
 
 class Overlay(QgsMapCanvasItem):
-    """Draws layers over the map, left of a line: a swipe; or all over it.
+    """Draws layers over the map, left of a swipe line or everywhere.
 
     Parameters
     ----------
     canvas
         The map.
     height
-        Where it lies among what is drawn over the map.
+        Stacking order among the items that are drawn over the map.
     """
 
     def __init__(self, canvas: QgsMapCanvas, height: float = 10) -> None:
@@ -64,15 +64,15 @@ class Overlay(QgsMapCanvasItem):
         canvas.mapCanvasRefreshed.connect(self.render)
 
     def show_layers(self, layers: list[Any], share: float = 1.0) -> None:
-        """Draw layers over the left `share` of the map; none: nothing."""
+        """Draw layers over the left `share` of the map; an empty list draws nothing."""
         self._layers, self.share = layers, share
         self.render()
 
     def take_away(self) -> None:
-        """Take this from the map for good."""
+        """Remove this item from the map permanently."""
         self.show_layers([])
         if self._job is not None:
-            # One that outlives QGIS crashes it.
+            # A rendering job that outlives QGIS crashes it.
             self._job.cancel()
         self._canvas.mapCanvasRefreshed.disconnect(self.render)
         self._canvas.scene().removeItem(self)
@@ -83,7 +83,7 @@ class Overlay(QgsMapCanvasItem):
         self.update()
 
     def render(self) -> None:
-        """Draw the layers anew, as the map is now."""
+        """Redraw the layers for the current map view."""
         self.setVisible(bool(self._layers))
         if not self._layers:
             return
@@ -102,14 +102,14 @@ class Overlay(QgsMapCanvasItem):
         self.update()
 
     def updatePosition(self) -> None:
-        """Lie where the image was drawn (called by QGIS when the map moves)."""
+        """Move to where the image was drawn (called by QGIS when the map moves)."""
         self.setRect(self._extent)
         self.setPos(self.toCanvasCoordinates(self._corner))
 
     def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
         if self._image.isNull() or not self._layers:
             return
-        # Without the frame around the map, which would stretch the image by two pixels.
+        # The viewport excludes the map's frame, which would stretch the image by two pixels.
         size = self._canvas.viewport().size()
         width = size.width() * self.share
         painter.save()
@@ -124,7 +124,7 @@ class Overlay(QgsMapCanvasItem):
 
 
 class PointsItem(QgsMapCanvasItem):
-    """Draws tie points: lines from nominal to reference positions, marks at the latter."""
+    """Draws tie points: lines from nominal to reference positions, with marks at the latter."""
 
     def __init__(self, canvas: QgsMapCanvas) -> None:
         super().__init__(canvas)
@@ -134,20 +134,20 @@ class PointsItem(QgsMapCanvasItem):
         self.setZValue(20)
 
     def show_points(self, rows: list[tuple[QgsPointXY, QgsPointXY, float, bool, bool]]) -> None:
-        """Draw rows of nominal place, place on the reference, residual, whether used and check."""
+        """Draw rows of nominal position, reference position, residual, and flags used and check."""
         self.rows = rows
         self.updatePosition()
 
     def updatePosition(self) -> None:
-        """Cover the map (called by QGIS when that moves)."""
+        """Cover the map (called by QGIS when the map moves)."""
         self.setRect(self._canvas.extent())
         self.setPos(self.toCanvasCoordinates(top_left(self._canvas)))
         self.update()
 
     def on_screen(self) -> NDArray[np.float64]:
-        """Return the pixels of the screen of nominal and reference places, shape (n, 2, 2).
+        """Return the screen pixels of nominal and reference positions, shape (n, 2, 2).
 
-        QGIS is asked for three places; the map's projection onto the screen is affine.
+        The mapping from map to screen is affine, so QGIS is asked for three positions only.
         """
         if not self.rows:
             return np.zeros((0, 2, 2))
@@ -161,7 +161,7 @@ class PointsItem(QgsMapCanvasItem):
         return np.asarray(first + share @ (np.array(others) - first))
 
     def paint(self, painter: Any, option: Any = None, widget: Any = None) -> None:
-        """Draw points that are drawn alike at once: they may be thousands."""
+        """Draw points of equal appearance together, as there may be thousands."""
         painter.setRenderHint(painter.RenderHint.Antialiasing)
         alike: dict[tuple[int, bool, bool], list[int]] = {}
         for index, (_, _, residual, used, check) in enumerate(self.rows):

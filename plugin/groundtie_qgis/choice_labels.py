@@ -1,8 +1,8 @@
-"""What dialogs show for the words that the command line has for choices; in English."""
+"""Labels in dialogs for the command line's choice words; in English."""
 
 from __future__ import annotations
 
-# Words that a capital does not make clear; all others stand for themselves.
+# Words that need more than a capital letter; all other words are their own labels.
 _LABELS = {
     "auto": "Automatic",
     "translation": "Translation (shift alone)",

@@ -39,5 +39,5 @@ STRETCH = _member(QgsContrastEnhancement, "ContrastEnhancementAlgorithm", "Stret
 WITHOUT_EXTREMES = _member(QgsRasterMinMaxOrigin, "Limits", "CumulativeCut")
 
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-# What a table's model returns: Qt 5 takes a number alone.
+# Alignment that a table model returns, as a plain number, which Qt 5 requires.
 RIGHT = int(getattr(_RIGHT, "value", _RIGHT))

@@ -1,4 +1,4 @@
-"""Turns a declared parameter into the definition of a Processing parameter."""
+"""Makes the definition of a Processing parameter from a declared parameter."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .library import kinds
 from .translation import tr
 from .wording import choice_label
 
-# A class of definitions, and what it takes besides name and label.
+# A definition class, and its arguments besides name and label.
 Made = tuple[Callable[..., QgsProcessingParameterDefinition], dict[str, Any]]
 
 
@@ -57,7 +57,7 @@ def definition(parameter: Any) -> QgsProcessingParameterDefinition:
 def file_filter(suffixes: tuple[str, ...], any_case: bool = False) -> str:
     """Return the filter of a file dialog for files that end in `suffixes`.
 
-    With `any_case` in capitals, too: QGIS 3.22 refuses _RPC.TXT for *.txt.
+    `any_case` adds the suffixes in capitals, as QGIS 3.22 refuses _RPC.TXT for *.txt.
     """
     files = tr("{} files")
     endings = {s: f"*{s} *{s.upper()}" if any_case else f"*{s}" for s in suffixes}
@@ -69,7 +69,7 @@ def _optional(parameter: Any) -> dict[str, Any]:
 
 
 def _default(parameter: Any) -> dict[str, Any]:
-    # In Processing, "optional" means that a value may be absent: with a default there always is.
+    # In Processing, "optional" means that a value may be absent; with a default, it never is.
     is_absent = not parameter.required and parameter.default is None
     return {"defaultValue": parameter.default, "optional": is_absent}
 
@@ -81,7 +81,7 @@ def _destination(parameter: Any) -> dict[str, Any]:
 
 @singledispatch
 def _made_of(kind: Any, parameter: Any) -> Made:
-    """Return the class of a parameter's definition, and what it takes besides name and label."""
+    """Return the class of a parameter's definition, and its arguments besides name and label."""
     raise TypeError(f"no Processing parameter for {type(kind).__name__}")
 
 
@@ -104,9 +104,9 @@ def _vector_in(kind: Any, parameter: Any) -> Made:
 
 
 class LayerOrFile(QgsProcessingParameterMapLayer):
-    """A raster or vector layer, or any file, also one that is no layer.
+    """A raster or vector layer, or any file, even if it is not a layer.
 
-    Of `TypeVector` the box of QGIS 3.22 offers nothing, and alone it offers rasters, too.
+    The box of QGIS 3.22 offers nothing for `TypeVector`, and rasters, too, if it is the only type.
     """
 
     def checkValueIsAcceptable(
@@ -127,7 +127,7 @@ def _mask_in(kind: Any, parameter: Any) -> Made:
 
 
 def takes_layers(kind: Any) -> bool:
-    """Whether a parameter is a file that may hold a vector layer: tie points, control points."""
+    """Whether a parameter is a file that may be a vector layer, as of tie or control points."""
     return isinstance(kind, kinds.FileIn) and ".gpkg" in kind.suffixes
 
 
@@ -172,14 +172,14 @@ def _number(kind: Any, parameter: Any) -> Made:
 
 
 class WordOrNumber(QgsProcessingParameterEnum):
-    """A choice shown by labels, given by its number, its label or the command line's word."""
+    """A choice shown by labels; its value is a number, a label or a word of the command line."""
 
     def __init__(self, name: str, label: str, words: Sequence[str], **more: Any) -> None:
         super().__init__(name, label, options=[*map(choice_label, words)], **more)
         self._words = tuple(words)
 
     def word(self, value: Any) -> str | None:
-        """Return the word of a value; None if it has none."""
+        """Return the word for a value; None if there is none."""
         given = str(value)
         if given in self._words:
             return given
@@ -228,7 +228,7 @@ def _crs(kind: Any, parameter: Any) -> Made:
 
 @_made_of.register(kinds.Band)
 def _band(kind: Any, parameter: Any) -> Made:
-    # QGIS 3.22 takes a band with a default for mandatory: a band is always optional.
+    # QGIS 3.22 treats a band with a default as mandatory, so a band is always optional.
     return QgsProcessingParameterBand, {
         "defaultValue": parameter.default,
         "parentLayerParameterName": qgis_name(kind.of),

@@ -1,4 +1,4 @@
-"""Names the Python packages that the tools need and QGIS's Python does not have."""
+"""Finds the Python packages that the tools need and QGIS's Python lacks."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _LOCK = threading.RLock()
 
 
 def missing_packages() -> list[str]:
-    """Return the distributions that all tools need and that are not found."""
+    """Return the missing distributions that all tools need."""
     return [p.name for p in packages.PACKAGES if p.needed_by_all and not p.found()]
 
 
 def missing_for(tool: str, paths: Iterable[Path]) -> list[str]:
-    """Return the distributions that are not found of those that a call of a tool needs beside."""
+    """Return the missing distributions that a specific call of a tool needs in addition."""
     return [p.name for p in packages.needed_for(tool, paths) if not p.found()]
 
 
 def complaint(missing: list[str]) -> str:
-    """Return one line that names what is missing and how to install it; empty if all is there."""
+    """Return one line on what is missing and how to install it; empty if nothing is missing."""
     if not missing:
         return ""
     one = tr(
@@ -43,7 +43,7 @@ def complaint(missing: list[str]) -> str:
 
 
 def install_command(missing: list[str], debian: bool | None = None) -> str:
-    """Return the command that installs `missing`: on Debian, or elsewhere; None: here."""
+    """Return the command that installs `missing`, on Debian or elsewhere; None: this system."""
     if Path("/etc/debian_version").exists() if debian is None else debian:
         names = {package.name: package.debian for package in packages.PACKAGES}
         return "sudo apt install " + " ".join(names[name] or f"python3-{name}" for name in missing)
@@ -52,13 +52,13 @@ def install_command(missing: list[str], debian: bool | None = None) -> str:
 
 @contextmanager
 def rasterio_env() -> Iterator[None]:
-    """Use rasterio in here, in the thread that calls it.
+    """Provide an environment for rasterio in the calling thread.
 
-    A rasterio wheel brings its own PROJ and GDAL, which cannot read the data files of QGIS's,
-    so the variables that lead there are out of its sight.
+    A rasterio wheel brings its own PROJ and GDAL, which cannot read the data files of QGIS's
+    versions, so the environment variables that point there are hidden.
     """
     spec = importlib.util.find_spec("rasterio")
-    if spec is None:  # nothing that needs it runs in here
+    if spec is None:  # then nothing inside this context needs it
         yield
         return
     origin = spec.origin

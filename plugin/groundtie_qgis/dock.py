@@ -19,7 +19,7 @@ from .translation import tr
 
 
 class GroundTieDock(QDockWidget):
-    """Drives the algorithms from two layers to a registered image that was looked at.
+    """Guides the user from two layers to a registered and inspected image.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class GroundTieDock(QDockWidget):
         QgsProject.instance().layersWillBeRemoved.connect(self._forget)
 
     def _turn_to(self, _: int) -> None:
-        """Show on the map what belongs to a page."""
+        """Show the map items of the current page."""
         page = self.tabs.currentWidget()
         self.repair.points.setVisible(page is not self.look)
         if page is not self.look:
@@ -59,7 +59,7 @@ class GroundTieDock(QDockWidget):
             self.repair.stop()
 
     def _registered(self, outcome: Outcome, reference: Any, input: Any) -> None:
-        """Go on with what came of a registration; one that was cancelled changes nothing."""
+        """Pass a registration's outcome to the other pages; a cancelled one changes nothing."""
         if not (outcome.succeeded or outcome.files.get("REPORT")):
             return
         registered = layer_of(outcome.files.get("OUTPUT"))
@@ -67,7 +67,7 @@ class GroundTieDock(QDockWidget):
         try:
             points = outcome.files.get("TIE_POINTS")
             if points is None and self.repair.has_points_of(reference, input):
-                pass  # A refusal brings none: those that a person has edited stay.
+                pass  # A refusal has no points: keep those that the user has edited.
             elif self.start.sensor is None:
                 self.repair.open(reference, input, points)
             elif points is not None:
@@ -80,7 +80,7 @@ class GroundTieDock(QDockWidget):
         self.look.show_pair(reference, layer)
 
     def _forget(self, ids: list[str]) -> None:
-        """Show nothing of layers that are taken out of the project; the others stay."""
+        """Stop showing layers that are removed from the project; the others stay."""
         if self.look.shows(ids):
             self.look.show_pair(None, None)
         if self.repair.shows(ids):
@@ -94,14 +94,14 @@ class GroundTieDock(QDockWidget):
         super().closeEvent(event)
 
     def showEvent(self, event: Any) -> None:
-        """Begin with what the project has."""
+        """Propose layers of the project."""
         if self.start.outcome is None:
             self.start.propose()
         self.repair.points.setVisible(self.tabs.currentWidget() is not self.look)
         super().showEvent(event)
 
     def take_away(self) -> None:
-        """Remove what was drawn on the map, and the connections (for unloading)."""
+        """Remove all map items and signal connections (for unloading)."""
         QgsProject.instance().layersWillBeRemoved.disconnect(self._forget)
         self.start.take_away()
         self.look.take_away()

@@ -1,4 +1,4 @@
-"""Makes an example, an invented SAR–optical pair, and loads it."""
+"""Simulates an example SAR–optical pair and loads it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from qgis.core import QgsProject
 from .compat import WARNING
 from .run import Outcome, Run, new_file
 
-# As README's: registers in seconds, and a person sees that the images do not fit.
+# As in README: registers in seconds, and its misregistration is visible.
 _VALUES = {"SIZE": 500, "DENSITY": "rural", "LOOKS": 4, "SEED": 1}
 
 
@@ -22,7 +22,7 @@ class Example:
     iface
         The desktop.
     loaded
-        Called when the images are in the project.
+        Called when the images have been added to the project.
     """
 
     def __init__(self, iface: Any, loaded: Callable[[], None]) -> None:
@@ -30,7 +30,7 @@ class Example:
         self._run: Run | None = None
 
     def make(self) -> None:
-        """Begin; while one is made, no other begins."""
+        """Start the simulation, unless one is already running."""
         if self._run is None:
             values = {"FOLDER": str(new_file("example")), **_VALUES}
             self._run = Run("simulate", values, {}, (), self._end, lambda _: None)
@@ -43,7 +43,7 @@ class Example:
             return
         layers = list(QgsProject.instance().mapLayers().values())
         canvas = self._iface.mapCanvas()
-        if len(layers) == 2:  # nothing else was there
+        if len(layers) == 2:  # the project was empty before
             canvas.setDestinationCrs(layers[0].crs())
             canvas.setExtent(layers[0].extent())
             canvas.refresh()

@@ -1,4 +1,4 @@
-"""The dialog that installs what is missing: it shows the command, asks, and runs it."""
+"""The dialog that installs missing packages: it shows the command, asks, and runs it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .translation import tr
 
 
 class InstallDialog(QDialog):
-    """Asks, runs pip and shows what it writes.
+    """Asks for consent, runs pip and shows its output.
 
     Parameters
     ----------
     folder
-        Where to the packages go.
+        Folder for the packages.
     finished
-        Called when packages were installed.
+        Called when packages have been installed.
     """
 
     def __init__(self, folder: Path, finished: Any, parent: Any = None) -> None:
@@ -94,7 +94,7 @@ class InstallDialog(QDialog):
         self._finished()
 
     def reject(self) -> None:
-        """Close; a pip that runs is stopped."""
+        """Close, and stop pip if it is running."""
         if self._process.state() != QProcess.ProcessState.NotRunning:
             self._process.kill()
             self._process.waitForFinished(3000)

@@ -1,4 +1,4 @@
-"""Puts missing Python packages into a folder of the plugin's own, where QGIS's own ones win."""
+"""Installs missing Python packages into the plugin's own folder; QGIS's packages have priority."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from pathlib import Path
 
 from .dependencies import packages
 
-# affine 3 needs newer attrs than a QGIS may have, and QGIS's own is found first.
+# affine 3 needs a newer attrs than QGIS may have, and QGIS's own attrs is found first.
 _BOUNDS = ("affine<3",)
 
 
 def packages_folder(settings: Path) -> Path:
-    """Return the folder for packages of this Python below QGIS's folder of settings."""
+    """Return the folder for packages of this Python version, in QGIS's settings folder."""
     return settings / "groundtie" / "python{}.{}".format(*sys.version_info[:2])
 
 
 def use_packages(folder: Path) -> None:
-    """Have packages in `folder` found, after those that QGIS brings."""
+    """Add `folder` to the module search path, after the packages of QGIS."""
     if folder.is_dir() and str(folder) not in sys.path:
         sys.path.append(str(folder))
     importlib.invalidate_caches()
 
 
 def missing_requirements() -> list[str]:
-    """Return the requirements, of tools and of some outputs, that are not met."""
+    """Return the unmet requirements of tools and of some outputs."""
     wanted = [package for package in packages.PACKAGES if not package.extra]
     return [package.requirement for package in wanted if not package.found()]
 
@@ -35,8 +35,8 @@ def missing_requirements() -> list[str]:
 def pip_command(requirements: list[str], folder: Path) -> list[str]:
     """Return the command that installs `requirements` into `folder`.
 
-    It takes wheels alone, and none that needs another numpy than QGIS's: QGIS's modules are
-    compiled for theirs, which is found first.
+    It accepts only wheels, and none that needs another numpy than QGIS's: QGIS's modules are
+    compiled for their own numpy, which is found first.
     """
     return [
         interpreter(),
@@ -48,7 +48,7 @@ def pip_command(requirements: list[str], folder: Path) -> list[str]:
 
 
 def numpy_bound() -> list[str]:
-    """Return the requirement of the numpy that QGIS has; none if it has none."""
+    """Return a requirement that pins QGIS's numpy; empty if QGIS has none."""
     try:
         import numpy
     except ImportError:
@@ -57,7 +57,7 @@ def numpy_bound() -> list[str]:
 
 
 def interpreter() -> str:
-    """Return QGIS's Python: in a QGIS that embeds it, `sys.executable` may be QGIS itself."""
+    """Return QGIS's Python; `sys.executable` may be QGIS itself where Python is embedded."""
     names = ("python3", "python", "python3.exe", "python.exe")
     folders = (Path(sys.exec_prefix), Path(sys.exec_prefix) / "bin", Path(sys.executable).parent)
     running = Path(sys.executable or "qgis")
@@ -68,7 +68,7 @@ def interpreter() -> str:
 
 
 def as_typed(command: list[str]) -> str:
-    """Return a command as one types it into a shell of this system."""
+    """Return a command as typed into a shell of this system."""
     if sys.platform == "win32":
         return " ".join(f'"{word}"' if re.search(r"[\s<>=]", word) else word for word in command)
     return shlex.join(command)

@@ -1,4 +1,4 @@
-"""Finds the GroundTie library: an installed one of the plugin's version, else the bundled copy."""
+"""Finds the GroundTie library: an installed copy of the plugin's version, else the bundled one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BUNDLED = f"{__package__}.groundtie"
 
 
 def plugin_metadata() -> dict[str, str]:
-    """Return the plugin's metadata; empty in a source tree, where it lies elsewhere."""
+    """Return the plugin's metadata; empty in a source tree, where the file lies elsewhere."""
     parser = configparser.ConfigParser(interpolation=None)
     parser.read(FOLDER / "metadata.txt", encoding="utf-8")
     return dict(parser["general"]) if parser.has_section("general") else {}
@@ -37,7 +37,7 @@ def library_module(name: str) -> ModuleType:
     return importlib.import_module(f"{library_name()}.{name}")
 
 
-# The light modules, which need no package beyond Python's own.
+# Light modules, which need only Python's standard library.
 errors = library_module("errors")
 kinds = library_module("kinds")
 progress = library_module("progress")

@@ -1,4 +1,4 @@
-"""The dock's second page: reference and registered image against each other, at full resolution."""
+"""The dock's second page: compare reference and registered image at full resolution."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from .reference_export import any_of, between
 from .translation import mark, tr
 
 _FLICKER_MS = 600
-# Side of what is shown of a place, in pixels of the reference: about one of the screen each.
+# Side of the area shown around a place, in reference pixels, of about one screen pixel each.
 _SHOWN_PX = 400
 _CORNERS = (mark("Top left"), mark("Top right"), mark("Bottom left"), mark("Bottom right"))
 
 
 class LookPage(QWidget):
-    """Swipes and flickers, and goes from place to place.
+    """Swipes and flickers between two images, and moves from place to place.
 
     Parameters
     ----------
     canvas
         The map.
     overlay
-        What draws images over it.
+        Draws images over the map.
     """
 
     def __init__(self, canvas: Any, overlay: Overlay) -> None:
         super().__init__()
         self._canvas, self._overlay = canvas, overlay
-        # The map itself may show anything above the registered image.
+        # The map itself may show other layers above the registered image.
         self._beneath = Overlay(canvas, 9)
         self._reference: Any = None
         self._registered: Any = None
@@ -89,17 +89,17 @@ class LookPage(QWidget):
         self._enable()
 
     def show_pair(self, reference: Any, registered: Any) -> None:
-        """Take two layers to look at; None: nothing."""
+        """Set the two layers to compare; None: none."""
         self.stop()
         self._reference, self._registered = reference, registered
         self._enable()
 
     def shows(self, ids: list[str]) -> bool:
-        """Return whether one of the layers with these ids is looked at."""
+        """Return whether one of the layers with these ids is being compared."""
         return any_of(ids, self._reference, self._registered)
 
     def show_worst(self, places: list[QgsPointXY]) -> None:
-        """Take the places to go to, on the map, the worst first."""
+        """Set the places to visit, in map coordinates, the worst first."""
         self._worst, self._at = places, -1
         self._enable()
 
@@ -116,19 +116,19 @@ class LookPage(QWidget):
         self.hint.setText(how if ready else tr("Register two images first."))
 
     def stop(self) -> None:
-        """Show the map as it is."""
+        """Show the plain map again."""
         self.swipe.setChecked(False)
         self.flicker.setChecked(False)
 
     def take_away(self) -> None:
-        """Take what this draws from the map for good."""
+        """Remove this page's map items permanently."""
         self.stop()
         self._beneath.take_away()
-        for shortcut in self._shortcuts:  # Of two with one key, Qt runs none.
+        for shortcut in self._shortcuts:  # Qt runs neither of two shortcuts with the same key.
             sip.delete(shortcut)
 
     def _show_both(self, on: bool, share: float) -> None:
-        """Draw the registered image, and over its left `share` the reference; or neither."""
+        """Draw the registered image and, over its left `share`, the reference; or neither."""
         self._beneath.show_layers([clearly(self._registered)] if on else [])
         self._overlay.show_layers([clearly(self._reference)] if on else [], share)
 
@@ -158,13 +158,13 @@ class LookPage(QWidget):
         self.hint.setText(reference if self._overlay.share else registered)
 
     def go(self, step: int) -> None:
-        """Go to the next, or the one before, of the worst points."""
+        """Go to the next or previous of the worst points."""
         if self._worst:
             self._at = (self._at + step) % len(self._worst)
             self.go_to(self._worst[self._at])
 
     def go_to_corner(self, index: int) -> None:
-        """Go to a corner of the registered image: a tenth of its sides inside."""
+        """Go to a corner of the registered image, inset by a tenth of its sides."""
         box = self._registered.extent()
         across, down = (0.1, 0.9)[index % 2], (0.9, 0.1)[index // 2]
         place = QgsPointXY(

@@ -1,4 +1,4 @@
-"""What the mouse does on the map while the dock looks at images or repairs points."""
+"""Mouse tools on the map for comparing images and repairing points."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from qgis.PyQt.QtCore import Qt
 
 from .canvas_items import Overlay, PointsItem
 
-# A click within this many pixels of the screen takes hold of a point.
+# Largest distance of a click that grabs a point, in screen pixels.
 _REACH_PX = 10
 
 
 class SwipeTool(QgsMapTool):
-    """The line between two images follows the mouse."""
+    """Moves the line between two images with the mouse."""
 
     def __init__(self, canvas: QgsMapCanvas, overlay: Overlay) -> None:
         super().__init__(canvas)
@@ -29,15 +29,15 @@ class SwipeTool(QgsMapTool):
 
 
 class DragTool(QgsMapTool):
-    """Takes hold of tie points and moves them.
+    """Grabs tie points and moves them.
 
     Parameters
     ----------
     moved
-        Called with the index, the end (0: in the input, 1: on the reference) and its new place on
-        the map.
+        Called with the index, the end (0: in the input, 1: on the reference) and the new map
+        position.
     chosen
-        Called with the index of a point that was clicked.
+        Called with the index of a clicked point.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class DragTool(QgsMapTool):
 
     def _nearest(self, position: Any) -> tuple[int, int] | None:
         off = self._points.on_screen() - (position.x(), position.y())
-        # The mark first: a line of no length ends there, too.
+        # The mark comes first, so that it wins for lines of zero length.
         squared = (off[:, ::-1] ** 2).sum(-1)
         if not (squared <= _REACH_PX**2).any():
             return None
@@ -82,7 +82,7 @@ class DragTool(QgsMapTool):
 
 
 class ClickTool(QgsMapTool):
-    """Hands one click after the other over."""
+    """Passes on every click."""
 
     def __init__(self, canvas: QgsMapCanvas, clicked: Callable[[QgsPointXY], None]) -> None:
         super().__init__(canvas)

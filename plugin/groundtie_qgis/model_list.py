@@ -1,4 +1,4 @@
-"""The points on the dock's third page and the models that are fitted to them, in words."""
+"""Texts on the dock's third page about the points and the models fitted to them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from .library import library_module
 from .translation import mark, tr
 from .wording import choice_label
 
-# As the verdict counts them.
+# The tolerance of the verdict.
 _TOLERANCE_PX = library_module("geometry.judging").TOLERANCE_PX
 
 FIRST_POINTS = mark(
     "There are no points yet. Add a point by a click in each image; three are needed."
 )
 
-# Words of models are long: the list shows what they begin with.
+# Short names of models for the list.
 _MODELS = {
     "translation": mark("Shift"),
     "rigid": mark("Rigid"),
@@ -23,19 +23,19 @@ _MODELS = {
     "affine": mark("Affine"),
 }
 
-# Models that are fitted to ground control, and the bias of RPCs that they stand for.
+# Models that are fitted to ground control, and the RPC bias that each represents.
 BIASES = {"translation": "shift", "affine": "affine"}
 
 
 def model_text(kind: str, fit: Any) -> str:
-    """Return what the list shows for a fitted model."""
+    """Return the list entry for a fitted model."""
     left_out = "–" if fit.left_out_px is None else f"{fit.left_out_px:.2f} px"
     model = tr(_MODELS[kind]) if kind in _MODELS else choice_label(kind)
     return tr("{model}: left-out error {error}").format(model=model, error=left_out)
 
 
 def points_text(review: Any, fit: Any) -> str:
-    """Return how many points take part, and how many check points agree with a fitted model."""
+    """Return the numbers of used points and of check points that agree with a fitted model."""
     points = review.points
     edited = int(review.points.edited.sum())
     used = tr("{used} of {all} points take part")

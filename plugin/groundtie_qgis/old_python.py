@@ -1,4 +1,4 @@
-"""What stands in for the plugin in a QGIS whose Python is too old: one clear sentence."""
+"""Replacement for the plugin in a QGIS whose Python is too old: one clear sentence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def which_qgis(platform: str) -> str:
 
 
 class OldPython:
-    """States which Python QGIS has and which one is needed; offers nothing."""
+    """States the Python version that QGIS has and the one that is needed; offers nothing else."""
 
     def __init__(self, iface: Any, oldest: tuple[int, int]) -> None:
         self._iface = iface
@@ -29,7 +29,7 @@ class OldPython:
         )
 
     def initProcessing(self) -> None:
-        """Leave the sentence in the log."""
+        """Write the sentence to the log."""
         QgsMessageLog.logMessage(self.complaint, "GroundTie", Qgis.MessageLevel.Warning)
 
     def initGui(self) -> None:
@@ -39,4 +39,4 @@ class OldPython:
         self._iface.messageBar().pushMessage("GroundTie", self.complaint, warning, 0)
 
     def unload(self) -> None:
-        """Leave nothing behind."""
+        """Do nothing: there is nothing to remove."""

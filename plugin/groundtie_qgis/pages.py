@@ -8,6 +8,6 @@ from .library import FOLDER
 
 
 def help_url(name: str) -> str:
-    """Return where the page of a tool, or another one, lies; empty if it was not built in."""
+    """Return the URL of a tool's or another page; empty if the page was not bundled."""
     page = FOLDER / "help" / f"{name.replace('_', '-')}.html"
     return QUrl.fromLocalFile(str(page)).toString() if page.is_file() else ""

@@ -59,7 +59,7 @@ class GroundTiePlugin:
             self._iface.messageBar().pushMessage("GroundTie", message, WARNING, 0)
 
     def unload(self) -> None:
-        """Take the provider and the menu away again."""
+        """Remove the provider and the menu."""
         for action in self.actions:
             self._iface.removePluginRasterMenu(MENU, action)
         if self.actions:
@@ -72,14 +72,14 @@ class GroundTiePlugin:
         self._remove_provider()
 
     def toggle_dock(self) -> None:
-        """Open the dock, or close it."""
+        """Open or close the dock."""
         if self.dock is not None and self.dock.isVisible():
             self.dock.close()
         else:
             self.open_dock()
 
     def open_dock(self) -> None:
-        """Show the dock; where packages are missing, offer them instead."""
+        """Show the dock; if packages are missing, offer to install them instead."""
         if self._lacks_packages():
             return
         if self.dock is None:
@@ -100,19 +100,19 @@ class GroundTiePlugin:
         self._example.make()
 
     def _lacks_packages(self) -> bool:
-        """Whether packages are missing; then they are offered."""
+        """Return whether packages are missing, and offer to install them if so."""
         if self.provider is None or not self.provider.warningMessage():
             return False
         self.install()
         return True
 
     def install(self) -> None:
-        """Offer to install what is missing."""
+        """Offer to install missing packages."""
         dialog = InstallDialog(self._packages, self._start_again, self._iface.mainWindow())
         dialog.exec()
 
     def show_help(self) -> None:
-        """Open the page on the plugin."""
+        """Open the plugin's documentation page."""
         QDesktopServices.openUrl(QUrl(help_url("qgis")))
 
     def _start_again(self) -> None:

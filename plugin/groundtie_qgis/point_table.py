@@ -26,8 +26,8 @@ HEADERS = (
 )
 ROLES = (mark("fit"), mark("check"))
 _USE, _POINT, _RESIDUAL, _SCORE, _ROLE, _EDITED = range(len(HEADERS))
-# The widest that columns show, besides their headings; space around texts, and for the arrow of the
-# column that sorts, in pixels of the screen.
+# Widest contents of the columns, besides their headings; and space around texts and for the sort
+# arrow, in screen pixels.
 _WIDEST = ("", "0000", "00.00", "000.00", "", "")
 _SPACE_PX, _ARROW_PX = 12, 16
 
@@ -42,12 +42,12 @@ class PointTable(QAbstractTableModel):
         self._review: Any = None
         self._residuals = np.zeros(0)
         self._sorted_by, self._descending = _RESIDUAL, True
-        # The points in the order of the table's rows, which is the table's own: a proxy would ask
-        # for every value some twenty times.
+        # Points in the order of the rows. The table sorts by itself because a proxy model would
+        # request every value some twenty times.
         self._order = np.zeros(0, int)
 
     def show_review(self, review: Any, residuals: Any) -> None:
-        """Show another state of the points; None: no points."""
+        """Show a new state of the points; None: no points."""
         known = review is not None and self._review is not None
         same = known and len(review.points) == len(self._review.points)
         self.layoutAboutToBeChanged.emit() if same else self.beginResetModel()
@@ -62,12 +62,12 @@ class PointTable(QAbstractTableModel):
         self.layoutChanged.emit()
 
     def _arrange(self) -> None:
-        """Put the points in the order that is asked for; what is selected goes with them."""
+        """Sort the points as requested; the selection moves with them."""
         if self._review is None:
             return
         values = self._sorted_values()
         before = self._order
-        # Without a number: last, in both directions.
+        # NaN sorts last in both directions.
         self._order = np.argsort(-values if self._descending else values, kind="stable")
         if len(before) == len(self._order):
             row_of = np.argsort(self._order)
@@ -85,7 +85,7 @@ class PointTable(QAbstractTableModel):
         return np.asarray(flags[self._sorted_by], int)
 
     def point_at(self, row: int) -> int:
-        """Return which point a row of the table shows."""
+        """Return the point that a row of the table shows."""
         return int(self._order[row])
 
     def row_of(self, point: int) -> int:
@@ -176,7 +176,7 @@ class PointView(QTableView):
         self.scrollTo(shown)
 
     def _fit_sizes(self) -> None:
-        """Make all columns fit into the view, once: points may be many, and change often."""
+        """Fit all columns into the view, only once, as points may be many and change often."""
         rows, columns = self.verticalHeader(), self.horizontalHeader()
         rows.hide()
         rows.setMinimumSectionSize(0)

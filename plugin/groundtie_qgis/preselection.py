@@ -1,4 +1,4 @@
-"""Which layers of the project a dialog begins with: never one as reference and as input."""
+"""Proposes layers for a dialog's boxes, never the same one as reference and as input."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .definitions import qgis_name, takes_layers
 from .library import kinds
 from .start_files import has_rpcs
 
-# What a box shows that shall begin empty: QGIS would fill it with a layer.
+# Value of a box that starts empty; otherwise QGIS would fill it with a layer.
 NOTHING = " "
 
 
 def preselect(algorithm: Any, tool: Any) -> None:
-    """Have the dialog of a tool begin with different layers in the boxes that must be filled.
+    """Preset the required layer boxes of a tool's dialog with different layers.
 
-    QGIS by itself begins with the active layer in all of them, also where points are asked for.
+    By default, QGIS puts the active layer into all of them, even those for points.
     """
     if not _in_desktop():
         return
@@ -55,10 +55,10 @@ def raster_files() -> list[Any]:
 
 
 def proposed_pair(rasters: list[Any], active: Any = None) -> tuple[Any, Any]:
-    """Return which of some layers to propose as reference and input; None where there is none.
+    """Return the layers to propose as reference and input; None where there is none.
 
-    Of two, the input is the one with RPCs, with smaller pixels, or with more bands: optical images
-    are.
+    Of two layers, the input is the one with RPCs, smaller pixels or more bands, as it is probably
+    the optical image.
     """
     first = sorted(rasters, key=lambda layer: layer is not active)[:2]
     if len(first) < 2:

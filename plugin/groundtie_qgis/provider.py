@@ -17,18 +17,18 @@ from .styling import ICON
 from .tool_loading import all_tools, named_tools
 from .unavailable import UnavailableAlgorithm, broken
 
-# The endings, without dot, that outputs of the tools may have, the usual one first: to ask the
-# tools would import them all.
+# Suffixes, without dot, of the tools' outputs, the usual one first. Asking the tools would import
+# them all.
 RASTERS = ("tif", "tiff", "vrt")
 VECTORS = ("gpkg", "geojson", "csv", "points", "txt")
-# The tool that runs where packages are missing, and states which.
+# The tool that runs even if packages are missing, and states which.
 DOCTOR = "doctor"
 
 
 def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
-    """Return the tools, or none of them and one line that states what to install.
+    """Return the tools, or no tools and one line that states what to install.
 
-    In the desktop, which shall start soon, a tool is imported when it is opened.
+    In the desktop, a tool is imported only when it is opened, to keep the start fast.
     """
     if missing := complaint(missing_packages()):
         return (), missing
@@ -42,7 +42,7 @@ def _tools_or_complaint() -> tuple[tuple[Any, ...], str]:
 
 
 class GroundTieProvider(QgsProcessingProvider):
-    """Offers GroundTie's tools; loads even where packages that they need are missing."""
+    """Offers GroundTie's tools; loads even if packages that they need are missing."""
 
     def __init__(self) -> None:
         super().__init__()

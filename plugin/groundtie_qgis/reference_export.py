@@ -1,4 +1,4 @@
-"""References that are no files: web maps, or the map as it is drawn, written to one."""
+"""Writes references that are not files, such as web maps or the current map, to a file."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .styling import MADE_FROM
 from .translation import mark
 
 MAP = mark("The map as it is drawn")
-# The side of the largest picture that is drawn; a larger input is compared with a coarser one.
+# Largest side of the drawn image; it is coarser than the input if that is larger.
 _MOST_PX = 8192
-# How much of the input's side is drawn around it, so that it may lie off.
+# Margin around the input, as a share of its longer side, that allows for its misregistration.
 _MARGIN = 0.1
 
 
@@ -34,7 +34,7 @@ def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, 
     Parameters
     ----------
     reference
-        A raster layer; None: the map as it is drawn, without the input and what was made from it.
+        A raster layer; None: the map as it is drawn, without the input and layers made from it.
     input
         The raster layer to be registered.
     canvas
@@ -49,18 +49,18 @@ def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, 
 
 
 def _shows(layer: Any, raster: Any) -> bool:
-    """Return whether a layer shows a raster: it would be registered to itself."""
+    """Return whether a layer shows a raster, which would then be registered to itself."""
     return file_name(raster) in (file_name(layer), layer.customProperty(MADE_FROM))
 
 
 def named(layer: Any) -> str:
-    """Return what names a layer to an algorithm: its id in the project, else its file."""
+    """Return a layer's identifier for an algorithm: its id in the project, else its source."""
     known = QgsProject.instance().mapLayer(layer.id()) is not None
     return str(layer.id() if known else layer.source())
 
 
 def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
-    """Return layers drawn over the extent of a raster, with its pixel size, as a file."""
+    """Draw layers over the extent of a raster, at its pixel size, into a file; return its layer."""
     path = new_file(f"{name}.tif")
     extent = input.extent()
     extent.grow(_MARGIN * max(extent.width(), extent.height()))
@@ -105,7 +105,7 @@ def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:
     }
     with rasterio_env(), rasterio.open(path, "w", **profile) as raster:
         raster.write(np.stack(bands))
-        raster.write_mask(opacity > 0)  # Where no layer draws there is no ground.
+        raster.write_mask(opacity > 0)  # Pixels that no layer covers are nodata.
 
 
 def between(source: Any, target: Any) -> QgsCoordinateTransform:

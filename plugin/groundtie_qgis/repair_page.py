@@ -1,4 +1,4 @@
-"""The dock's third page: tie points as a table and on the map, fitted again after every change."""
+"""The dock's third page: tie points in a table and on the map, refitted after every change."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ from .writer import Writer
 
 
 class RepairPage(QWidget):
-    """Switches points off, moves and adds them, and writes the image that they give.
+    """Switches points on and off, moves and adds them, and writes the resulting image.
 
     Parameters
     ----------
     canvas
         The map.
     overlay
-        What draws images over it.
+        Draws images over the map.
     changed
-        Called with the places of the points on the map, the worst first, after every fit.
+        Called after every fit with the map positions of the points, the worst first.
     written
-        Called with the reference and the layer that was written.
+        Called with the reference and the written layer.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class RepairPage(QWidget):
         self._input: Any = None
         self._clicked: tuple[float, float] | None = None
         self.writer = Writer(self._end_writing)
-        # What an image with RPCs is, which then is written in place of the input.
+        # The image with RPCs, if any, which is then written in place of the input.
         self._sensor: SensorImage | None = None
         self.points = PointsItem(canvas)
         self._drag = DragTool(canvas, self.points, self._moved_on_map, self._choose)
@@ -85,7 +85,7 @@ class RepairPage(QWidget):
         self.add.setCheckable(True)
         self.drag.toggled.connect(self._set_dragging)
         self.add.toggled.connect(self._set_adding)
-        # Released where another tool of the map is chosen, of these or of QGIS.
+        # The buttons are released when another map tool, of this page or of QGIS, is chosen.
         self._drag.setButton(self.drag)
         self._click.setButton(self.add)
         self.match = QCheckBox(tr("refine clicks by similarity"))
@@ -108,7 +108,7 @@ class RepairPage(QWidget):
         self.write.setEnabled(bool(self.fits) and self.writer.run is None)
 
     def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
-        """Take the ground control of an image with RPCs, which `ortho` shows on the map."""
+        """Load the ground control of an image with RPCs, which `ortho` shows on the map."""
         review = library_module("review")
         files, dem = outcome.files, image.dem
         with rasterio_env():
@@ -124,7 +124,7 @@ class RepairPage(QWidget):
         self.change(opened, "translation")
 
     def open(self, reference: Any, input: Any, path: Any) -> None:
-        """Take the tie points of a registration; None: begin with none."""
+        """Load the tie points of a registration; None: start without points."""
         review = library_module("review")
         self._reference, self._input, self._sensor = reference, input, None
         with rasterio_env():
@@ -136,7 +136,7 @@ class RepairPage(QWidget):
         self.text.setText(self._summary() if path is not None else tr(FIRST_POINTS))
 
     def close_points(self) -> None:
-        """Forget the points."""
+        """Discard the points."""
         self.stop()
         self.review, self.fits = None, {}
         self._reference = self._input = self._sensor = None
@@ -153,7 +153,7 @@ class RepairPage(QWidget):
         return any_of(ids, self._reference, self._input, *image)
 
     def take_away(self) -> None:
-        """Take what this draws from the map for good."""
+        """Remove this page's map items permanently."""
         self.stop()
         if self.writer.run is not None:
             self.writer.run.cancel()
@@ -161,21 +161,21 @@ class RepairPage(QWidget):
         self._canvas.scene().removeItem(self.points)
 
     def has_points_of(self, reference: Any, input: Any) -> bool:
-        """Return whether there are points between two layers."""
+        """Return whether this page has points between two layers."""
         mine = self._reference is reference and self._input is input
         return mine and self.review is not None and len(self.review.points) > 0
 
     def stop(self) -> None:
-        """Leave the map to others."""
+        """Release the map tools."""
         self.drag.setChecked(False)
         self.add.setChecked(False)
 
     def kind(self) -> str:
-        """Return the model that is chosen."""
+        """Return the chosen model."""
         return str(self.model.currentData() or "")
 
     def change(self, review: Any, kind: str | None = None) -> None:
-        """Show another state of the points, and fit them."""
+        """Show a new state of the points and refit them."""
         wanted = kind or self.kind() or "affine"
         self.review = review
         self.fits = review.fits() if self._sensor is None else review.fits([*BIASES])
@@ -259,7 +259,7 @@ class RepairPage(QWidget):
         self.add_point(first, self.review.input_px(self._on_reference(place)))
 
     def add_point(self, reference_xy: Any, input_px: Any) -> None:
-        """Add a point, where similarity refines it if that is asked for."""
+        """Add a point, refined by similarity if that is requested."""
         score, note = float("nan"), ""
         if self.match.isChecked():
             review = library_module("review")
@@ -278,7 +278,7 @@ class RepairPage(QWidget):
         self.text.setText(self._summary() + note)
 
     def start_writing(self) -> None:
-        """Write the image by the points."""
+        """Write the image by the model fitted to the points."""
         fit = self.fits[self.kind()]
         layers = self._reference, self._input
         if refusal := self.writer.start(self.review, fit, *layers, self._sensor):
@@ -289,7 +289,7 @@ class RepairPage(QWidget):
     def _end_writing(self, outcome: Outcome) -> None:
         self._enable()
         if self.review is None:
-            return  # One of the layers was taken out of the project meanwhile.
+            return  # One of the layers was removed from the project meanwhile.
         if not outcome.succeeded:
             self.text.setText(tr("Not written: {}.").format(outcome.reason.rstrip(".")))
             return
@@ -312,6 +312,6 @@ class RepairPage(QWidget):
         return (x - 0.5, -y - 0.5) if self._is_on_pixels() else (x, y)
 
     def _is_on_pixels(self) -> bool:
-        """Whether positions are pixels: QGIS draws them downwards from 0, centres at halves."""
+        """Whether positions are pixels; QGIS draws them downwards from 0, centres at halves."""
         review = self.review
         return review.points.crs is None and not review.input_grid.is_georeferenced

@@ -1,4 +1,4 @@
-"""Reports in QGIS's Results Viewer, and layers that were not made."""
+"""Reports in QGIS's Results Viewer, and layers to load or not to load."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .styling import ICON
 
 
 def show_report(name: str, path: Path) -> None:
-    """List a page in the Results Viewer, where QGIS lists those of successful runs alone."""
+    """List a page in the Results Viewer, where QGIS lists only those of successful runs."""
     from qgis.utils import iface
 
-    if iface is None:  # no desktop
+    if iface is None:  # without a desktop
         return
     from processing.core.ProcessingResults import resultsList
 
@@ -24,7 +24,7 @@ def show_report(name: str, path: Path) -> None:
 
 
 def load_on_completion(path: Path, context: QgsProcessingContext) -> None:
-    """Have a raster loaded that is no output of its own; where there is a desktop."""
+    """Schedule a raster that is not a separate output for loading, if there is a desktop."""
     from qgis.utils import iface
 
     if iface is not None and context.project() is not None:
@@ -33,7 +33,7 @@ def load_on_completion(path: Path, context: QgsProcessingContext) -> None:
 
 
 def forget_layers(context: QgsProcessingContext, paths: Iterable[str]) -> None:
-    """Have layers not loaded that a run did not make: QGIS would complain of each."""
+    """Cancel loading of layers that a run did not write, as QGIS would report each as missing."""
     left = context.layersToLoadOnCompletion()
     for path in paths:
         left.pop(path, None)

@@ -1,4 +1,4 @@
-"""Runs GroundTie's algorithms in the background for the dock, and returns what came of them."""
+"""Runs GroundTie's algorithms in the background for the dock, and returns their outcomes."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from .translation import tr
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run.
+    """The outcome of a run.
 
     Parameters
     ----------
     succeeded
-        Whether it did what it was asked for.
+        Whether the run succeeded.
     reason
-        Why not, in one line.
+        Why it did not, in one line.
     lines
-        What the tool stated of its result, a line each.
+        The tool's statements about its result.
     files
-        What was written, by parameter.
+        Written files, by parameter.
     """
 
     succeeded: bool
@@ -43,7 +43,7 @@ class Outcome:
 
 
 class Listener(QgsProcessingFeedback):
-    """Keeps what a run states of its result, and its errors."""
+    """Collects a run's statements about its result, and its errors."""
 
     def __init__(self) -> None:
         super().__init__(False)
@@ -51,7 +51,7 @@ class Listener(QgsProcessingFeedback):
         self.errors: list[str] = []
 
     def pushResult(self, line: str) -> None:
-        """Take a line of the result (called by the algorithms of tools)."""
+        """Collect a line of the result (called by the algorithms of tools)."""
         self.lines.append(line)
 
     def reportError(self, error: str, fatalError: bool = False) -> None:
@@ -68,13 +68,13 @@ class Run:
     values
         Values of its parameters.
     files
-        Files to be written, by parameter; those of `layers` are loaded.
+        Files to be written, by parameter.
     layers
-        Parameters whose files are added to the map.
+        Parameters whose files are loaded into the map.
     done
         Called with the `Outcome`, in the main thread.
     progress
-        Called with per cent.
+        Called with the progress in per cent.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Run:
             self._values[name] = loaded if name in layers else str(path)
 
     def start(self) -> None:
-        """Begin, if the values are right; else the outcome states what is wrong."""
+        """Start if the values are valid; otherwise the outcome states the error."""
         able, why = self._algorithm.canExecute()
         valid = False
         if able:
@@ -112,7 +112,7 @@ class Run:
             self._algorithm, self._values, self._context, self._feedback
         )
         self._task.executed.connect(self._end)
-        # The task uses context and feedback, which it does not keep: without them QGIS crashes.
+        # Keeps context and feedback alive, which the task uses but does not own: QGIS would crash.
         self._task.setProperty("run", self)
         QgsApplication.taskManager().addTask(self._task)
 
@@ -135,5 +135,5 @@ class Run:
 
 
 def new_file(name: str) -> Path:
-    """Return a path in QGIS's temporary folder at which nothing lies."""
+    """Return an unused path in QGIS's temporary folder."""
     return Path(QgsProcessingUtils.generateTempFilename(name))

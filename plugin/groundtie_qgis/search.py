@@ -1,4 +1,4 @@
-"""How far an image is searched for where nobody states it."""
+"""The default search radius."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .start_files import file_name, has_rpcs
 
 
 def usual_radius_m(tool: str, reference: Any, input: Any) -> float:
-    """Return how far a tool searches for the input's layer by default, in metres.
+    """Return a tool's default search radius for two layers, in metres.
 
-    In pixels where there is no georeferencing; 0 where a layer is gone.
+    Without georeferencing, it is in pixels. It is 0 if a layer or its file is gone.
     """
     if any(layer is None or sip.isdeleted(layer) for layer in (reference, input)):
         return 0.0
     opening, specification = (
         library_module(f"registration.{name}") for name in ("opening", "specification")
     )
-    # What decides by the images takes the widest search at last.
+    # `register` decides by the images, and its last attempt is the widest search.
     free = {
         "register": specification.ANYWHERE,
         "coregister": specification.COREGISTER.free,
@@ -31,12 +31,12 @@ def usual_radius_m(tool: str, reference: Any, input: Any) -> float:
     try:
         with rasterio_env():
             return float(opening.usual_radius_m(_grid(reference), _grid(input), free[tool]))
-    except errors.GroundTieError:  # The file is gone: the next try states it.
+    except errors.GroundTieError:  # The file is gone, which the next run reports.
         return 0.0
 
 
 def _grid(layer: Any) -> Any:
-    """Return the grid of a layer's file, of one with RPCs that by which QGIS draws it."""
+    """Return the grid of a layer's file; for RPCs, the grid with which QGIS draws it."""
     if not has_rpcs(layer):
         with library_module("rasters.reading").open_raster(file_name(layer)) as raster:
             return raster.grid

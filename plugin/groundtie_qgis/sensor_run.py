@@ -1,4 +1,4 @@
-"""Runs what an image with RPCs takes: refined RPCs, and an orthoimage by them."""
+"""Runs the steps for an image with RPCs: refinement of the RPCs and orthorectification."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import Any
 from .run import Outcome, Run, new_file
 from .start_files import points_name
 
-# How much of the time goes into refining.
+# Share of the run time for the refinement.
 _FIRST = 0.8
 
 
 @dataclass(frozen=True)
 class SensorImage:
-    """An image with RPCs, and what its ground is.
+    """An image with RPCs and its terrain model.
 
     Parameters
     ----------
     layer
         The image's layer.
     dem
-        The terrain model's layer; None: one height holds everywhere.
+        The terrain model's layer; None: one constant height.
     datum
-        What the heights of the terrain model count from.
+        Vertical datum of the terrain model.
     """
 
     layer: Any
@@ -32,13 +32,13 @@ class SensorImage:
     datum: str
 
     def values(self) -> dict[str, Any]:
-        """Return the values that the tools for images with RPCs have in common."""
+        """Return the parameter values that all tools for images with RPCs share."""
         heights = {} if self.dem is None else {"DEM": self.dem.id(), "DEM_DATUM": self.datum}
         return {"IMAGE": self.layer.id(), **heights}
 
 
 class SensorRun:
-    """Refines the RPCs of an image, and orthorectifies it on the reference's pixels.
+    """Refines the RPCs of an image and orthorectifies it to the reference's pixels.
 
     The outcome's files are `RPC`, `TIE_POINTS` (the ground control), `REPORT` and `OUTPUT` (the
     orthoimage, which is loaded).
@@ -48,11 +48,11 @@ class SensorRun:
     image
         The image.
     reference
-        What names the reference to an algorithm.
+        Identifier of the reference for an algorithm.
     control
-        Values for `refine_rpc` that state where ground control comes from, and which model.
+        Values for `refine_rpc` that give the source of ground control and the model.
     done, progress
-        As of `Run`.
+        As in `Run`.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class SensorRun:
         done: Callable[[Outcome], None],
         progress: Callable[[float], None],
     ) -> None:
-        # Layers may be taken out of the project meanwhile.
+        # Read now, as layers may be removed from the project meanwhile.
         self._values, self._reference = image.values(), reference
         self._done, self._progress = done, progress
         files = {
@@ -76,7 +76,7 @@ class SensorRun:
         self._lines: tuple[str, ...] = ()
 
     def start(self) -> None:
-        """Begin, if the values are right; else the outcome states what is wrong."""
+        """Start if the values are valid; otherwise the outcome states the error."""
         self._run.start()
 
     def cancel(self) -> None:

@@ -1,4 +1,4 @@
-"""The models that the plugin ships: chains of tools, to run and to begin own models with."""
+"""The models that the plugin ships: chains of tools to run or to base own models on."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ MODELS = FOLDER / "models"
 
 
 class ShippedModel(QgsProcessingModelAlgorithm):
-    """The model of a file; its tools are looked for when a copy is made to be run.
+    """A model from a file; its tools are looked up only when a copy is made for a run.
 
-    QGIS has one text for a model's name and its title; here the title is in its help.
+    QGIS has one text for a model's name and title, so the title is kept in its help.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,5 +49,5 @@ class ShippedModel(QgsProcessingModelAlgorithm):
 
 
 def load_models() -> list[ShippedModel]:
-    """Return all models that are shipped."""
+    """Return all shipped models."""
     return [ShippedModel(path) for path in sorted(MODELS.glob("*.model3"))]

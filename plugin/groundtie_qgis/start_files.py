@@ -1,4 +1,4 @@
-"""Names of layers' and of the dock's files, and which images have RPCs."""
+"""File names of layers and of the dock's outputs, and detection of images with RPCs."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from .dependencies import missing_for
 
 
 def points_name() -> str:
-    """Return the name of a file of tie points that can be written here."""
+    """Return a name for a tie-point file in a format that can be written here."""
     name = "tie_points.gpkg"
     return "tie_points.geojson" if missing_for("", [Path(name)]) else name
 
 
 def file_name(layer: Any) -> str:
-    """Return a raster layer's source without the options that QGIS hangs onto it."""
+    """Return a raster layer's source without the options that QGIS appends."""
     return re.sub(r"\|(option|credential):[^|]*| authcfg='[^']+'", "", layer.source())
 
 
 def has_rpcs(layer: Any) -> bool:
-    """Whether a raster layer is located by RPCs alone; QGIS draws it as GDAL warps it by them."""
+    """Whether a raster layer is located only by RPCs, with which GDAL warps it for QGIS."""
     from osgeo import gdal
 
     if layer is None or layer.providerType() != "gdal":
         return False
     try:
         dataset = gdal.Open(file_name(layer))
-    except RuntimeError:  # Another plugin may have GDAL raise where a file is gone.
+    except RuntimeError:  # Another plugin may have enabled GDAL exceptions; the file is gone.
         return False
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
         return False

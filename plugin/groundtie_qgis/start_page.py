@@ -1,4 +1,4 @@
-"""The dock's first page: which images, how to register them, and what came of it."""
+"""The dock's first page: choice of images, options of the registration, and its outcome."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .tries import BandRows, Tries, have_bands
 from .verdict_label import VerdictLabel, first_lines
 from .wording import choice_label
 
-# What a pair may be, and the tool for it.
+# Kinds of image pairs, by the tool for each.
 PAIRS = {
     "register": mark("Decided by the images"),
     "coregister": mark("SAR and optical"),
@@ -64,7 +64,7 @@ class StartPage(QWidget):
         self.sensor: SensorImage | None = None
         self.outcome: Outcome | None = None
         self._layers: tuple[Any, ...] = ()
-        # In a project without layers the map stands in the box without being chosen.
+        # In a project without layers, the box shows the map although nobody chose it.
         self._chose_map = False
         self._build()
         self.propose()
@@ -103,7 +103,7 @@ class StartPage(QWidget):
         self.tries.bands.clicked.connect(self.choose_bands)
         self.report.clicked.connect(self.open_report)
         self.pair.currentIndexChanged.connect(self._show_options)
-        # Later: while layers are taken out of the project, some of them are gone already.
+        # Delayed: while layers are being removed from the project, some are already deleted.
         self._apart = QTimer(self)
         self._apart.setSingleShot(True)
         self._apart.timeout.connect(self._keep_apart)
@@ -134,7 +134,7 @@ class StartPage(QWidget):
         layout.addStretch()
 
     def propose(self) -> None:
-        """Fill boxes that hold the same, or nothing, with two rasters of the project."""
+        """Fill boxes that hold the same layer, or none, with two rasters of the project."""
         if self._chose_map and self._from_map():
             return
         if self.reference.currentLayer() not in (None, self.input.currentLayer()):
@@ -152,7 +152,7 @@ class StartPage(QWidget):
         self._apart.start(0)
 
     def _keep_apart(self) -> None:
-        """Give the other box another layer where both hold the same."""
+        """If both boxes hold the same layer, give another to the box that was not changed."""
         self._show_options()
         changed = self._changed
         other = self.input if changed is self.reference else self.reference
@@ -173,7 +173,7 @@ class StartPage(QWidget):
         self.rotated.setEnabled(asked and not sensor)
 
     def start_or_cancel(self) -> None:
-        """Begin to register, or stop that."""
+        """Start a registration, or cancel the running one."""
         if self._run is not None:
             self._run.cancel()
             return
@@ -199,7 +199,7 @@ class StartPage(QWidget):
         self._run.start()
 
     def take_away(self) -> None:
-        """Stop what runs (for unloading)."""
+        """Cancel a running registration (for unloading)."""
         if self._run is not None:
             self._run.cancel()
 
@@ -213,7 +213,7 @@ class StartPage(QWidget):
         self.report.hide()
 
     def _start_sensor(self, image: Any) -> None:
-        """Refine the RPCs of an image in the reference, and orthorectify it."""
+        """Refine the RPCs of an image against the reference, and orthorectify it."""
         reference = self.reference.currentLayer()
         self._layers = (reference, image)
         if reference is None or reference.providerType() != "gdal":
@@ -227,7 +227,7 @@ class StartPage(QWidget):
         self._run.start()
 
     def _control(self, reference: Any) -> dict[str, Any]:
-        """Return where ground control comes from: it is matched in the reference."""
+        """Return the source of ground control, which is matched in the reference."""
         radius = {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
         return {"REFERENCE": reference.id(), **radius}
 
@@ -242,7 +242,7 @@ class StartPage(QWidget):
         heights = () if self.sensor is None else (self.sensor.dem,)
         layers = (*self._layers, *heights)
         if any(layer is not None and sip.isdeleted(layer) for layer in layers):
-            self._layers = ()  # Taken out of the project meanwhile.
+            self._layers = ()  # A layer was removed from the project meanwhile.
         self.register.setText(tr("Register"))
         self.progress.hide()
         report = outcome.files.get("REPORT")
@@ -260,7 +260,7 @@ class StartPage(QWidget):
         self.verdict.state(good, text, tuple(layer for layer in self._layers if layer is not None))
 
     def _worth_a_try(self) -> tuple[QPushButton, ...]:
-        """Return the buttons for what was not tried yet."""
+        """Return the buttons for what may help after a refusal."""
         tries = self.tries
         if self.sensor is not None:
             return (tries.wider,)
@@ -272,7 +272,7 @@ class StartPage(QWidget):
         return tuple(button for button, is_new in offered.items() if is_new)
 
     def choose_bands(self) -> None:
-        """Ask which bands are matched."""
+        """Let the user choose the bands that are matched."""
         self.bands.show()
         self.tries.offer(self._worth_a_try())
 

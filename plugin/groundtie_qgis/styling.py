@@ -1,4 +1,4 @@
-"""How the layers of a run look and where they lie."""
+"""Style and grouping of the layers of a run."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from .compat import LINE
 from .library import FOLDER
 
 ICON = FOLDER / "icons" / "groundtie.svg"
-# What a layer that was made here keeps, also in a project's file: the file of its raster.
+# Custom property, saved in projects, of layers made here: the raster file they were made from.
 MADE_FROM = "groundtie/made_from"
 TIE_POINTS = FOLDER / "styles" / "tie_points.qml"
 
 
 def icon_of(name: str) -> Path:
-    """Return the icon of a tool; GroundTie's own where it has none."""
+    """Return the icon of a tool, or GroundTie's icon if it has none."""
     path = ICON.with_name(f"{name}.svg")
     return path if path.is_file() else ICON
 
 
 class LoadedLayers:
-    """The layers that one run loads: several come into one group, what is drawn over rasters first.
+    """The layers that a run loads; several layers form a group, with vectors above rasters.
 
     Parameters
     ----------
@@ -53,10 +53,10 @@ class LoadedLayers:
         renderer: QgsRasterRenderer | None = None,
         made_from: str | None = None,
     ) -> None:
-        """Have the layer of the file `path` finished, if the run's context loads it.
+        """Schedule the layer of the file `path` for finishing, if the run's context loads it.
 
-        Lines are drawn as tie points, rasters by the renderer of another raster, whose file the
-        layer keeps.
+        Lines are styled as tie points. Rasters take `renderer`, which is that of another raster,
+        and record the file `made_from`.
         """
         if context.willLoadLayerOnCompletion(path):
             details = context.layerToLoadOnCompletionDetails(path)
@@ -72,7 +72,7 @@ class LoadedLayers:
             return
         parent = node.parent()
         if self._group is None or sip.isdeleted(self._group):
-            # QGIS adds layers above the selected one, which may lie below others.
+            # QGIS adds layers above the selected one, which may be below others.
             self._group = project.layerTreeRoot().insertGroup(0, self._title)
         top = isinstance(layer, QgsVectorLayer)
         self._group.insertChildNode(0 if top else len(self._group.children()), node.clone())
@@ -80,7 +80,7 @@ class LoadedLayers:
 
 
 class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
-    """Gives one layer its look and its place."""
+    """Applies the style and the group to one layer."""
 
     def __init__(
         self,
@@ -119,20 +119,20 @@ def _draw_as_tie_points(layer: QgsVectorLayer, feedback: QgsProcessingFeedback) 
 
 
 def draw_alike(layer: QgsRasterLayer, renderer: QgsRasterRenderer) -> None:
-    """Draw a raster as another one with the same values: same bands, colours and stretch.
+    """Draw a raster like another one with the same values: same bands, colours and stretch.
 
-    A stretch of its own would count what lies outside of its mask.
+    A separate stretch would include pixels outside the raster's mask.
     """
     if max(renderer.usesBands(), default=0) > layer.bandCount():
         return
     alike = renderer.clone()
-    # a mask of its own is transparent
+    # the raster keeps its own mask as transparency
     alike.setAlphaBand(layer.renderer().alphaBand())
     layer.setRenderer(alike)
     layer.triggerRepaint()
 
 
-# The context deletes the post-processor at its end; until then its Python half must be kept.
+# The context deletes the post-processor at its end; its Python object must live until then.
 _kept: list[LayerFinisher] = []
 
 

@@ -1,4 +1,4 @@
-"""Loads the declarations of tools, each when QGIS first needs more than its name."""
+"""Loads the declarations of tools, each one when QGIS first needs more than its name."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .library import library_module, library_name
 
 def all_tools() -> tuple[Any, ...]:
     """Return the declarations of all tools."""
-    # warnings of dependencies to the library's developers are nothing for QGIS's log
+    # developer warnings of dependencies do not belong in QGIS's log
     warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
     return tuple(library_module("tools").load_tools())
 
 
 class LazyTool:
-    """A tool's declaration, imported with all that it needs when more than its name is asked for.
+    """A tool's declaration, imported with its dependencies at the first access beyond its name.
 
     Raises
     ------
     ImportError
-        Then: a package cannot be used.
+        On that access, if a package cannot be used.
     """
 
     def __init__(self, name: str, title: str, group: str, summary: str) -> None:
@@ -34,7 +34,7 @@ class LazyTool:
         self.summary = summary
 
     def loaded(self) -> bool:
-        """Whether it is imported."""
+        """Whether the declaration has been imported."""
         return self.name in _TOOLS
 
     def __getattr__(self, attribute: str) -> Any:
@@ -43,7 +43,7 @@ class LazyTool:
 
 @cache
 def named_tools() -> tuple[LazyTool, ...]:
-    """Return all tools by what a list shows of them; none of them is imported for it."""
+    """Return all tools with the texts for a list, without importing them."""
     tools = library_module("tools")
     return tuple(LazyTool(**vars(tools.named_tool(name))) for name in tools.NAMES)
 

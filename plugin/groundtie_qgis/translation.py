@@ -1,7 +1,7 @@
 """The plugin's texts in the language of QGIS, from Qt Linguist's files `i18n/groundtie_XX.ts`.
 
-The files are read as they are: the plugin asks for its own texts alone, and nothing has to be
-compiled to change one. `scripts/translations.py` keeps them complete.
+The files are read directly: the plugin needs only its own texts, and a changed file need not be
+compiled. `scripts/translations.py` keeps them complete.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ FOLDER = Path(__file__).resolve().parent / "i18n"
 
 
 def tr(text: str) -> str:
-    """Return a text in the language of QGIS; where that has no translation, as it is."""
+    """Return a text in the language of QGIS; without a translation, it is unchanged."""
     return _texts(language()).get(text, text)
 
 
 def mark(text: str) -> str:
-    """Return a text as it is: it is to be translated where it is shown."""
+    """Mark a text for translation where it is shown, and return it unchanged."""
     return text
 
 
 def language() -> str:
-    """Return the language of QGIS: two letters."""
+    """Return the two-letter language code of QGIS."""
     from qgis.core import QgsApplication
 
     return str(QgsApplication.locale())[:2]

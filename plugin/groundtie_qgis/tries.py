@@ -1,4 +1,4 @@
-"""What the dock offers to try after a refusal, and the bands that it registers."""
+"""Remedies that the dock offers after a refusal, and the choice of bands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NAMES = (
 
 
 class Tries(QWidget):
-    """Buttons for what may help where a registration was refused."""
+    """Buttons for remedies after a refused registration."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class Tries(QWidget):
         self.offer(())
 
     def offer(self, buttons: tuple[QPushButton, ...]) -> None:
-        """Show some of the buttons, two a row; the others are hidden."""
+        """Show the given buttons, two per row, and hide the others."""
         for button in self._all:
             self._grid.removeWidget(button)
         for place, button in enumerate(buttons):
@@ -39,7 +39,7 @@ class Tries(QWidget):
 
 
 class BandRows(QWidget):
-    """Which band of the reference and of the input is matched; not set: as the tool chooses."""
+    """Choice of the bands of reference and input to match; not set: the tool chooses."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,13 +52,13 @@ class BandRows(QWidget):
         labels = tr("Band of the reference"), tr("Band of the input")
         for label, box in zip(labels, self.boxes.values(), strict=True):
             box.setShowNotSetOption(True, tr("usual"))
-            # The names of bands may be long: they must not make the dock wide.
+            # Long names of bands must not widen the dock.
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
             layout.addRow(label, box)
         self.hide()
 
     def take(self, *layers: Any) -> None:
-        """Offer the bands of the reference and of the input; of new layers none is set."""
+        """Offer the bands of the reference and of the input; new layers start with none set."""
         for box, layer in zip(self.boxes.values(), layers, strict=True):
             file = layer if is_file(layer) else None
             if box.layer() != file:
@@ -66,7 +66,7 @@ class BandRows(QWidget):
                 box.setBand(-1)
 
     def values(self) -> dict[str, int]:
-        """Return the bands that are set, by parameter."""
+        """Return the chosen bands, by parameter."""
         bands = {name: box.currentBand() for name, box in self.boxes.items()}
         return {name: band for name, band in bands.items() if band > 0}
 

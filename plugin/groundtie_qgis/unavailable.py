@@ -1,4 +1,4 @@
-"""What the toolbox shows of a tool, and what stands in for one that lacks packages."""
+"""A tool's entry in the toolbox, and the replacement for a tool that lacks packages."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from .translation import tr
 
 
 def broken(error: ImportError) -> str:
-    """Return one line that states which package cannot be used."""
+    """Return one line that names the package that cannot be used."""
     return tr("GroundTie cannot use a Python package: {}").format(" ".join(str(error).split()))
 
 
 class NamedAlgorithm(QgsProcessingAlgorithm):
-    """What the toolbox shows of a tool's algorithm.
+    """The name, group and other toolbox texts of a tool's algorithm.
 
     Parameters
     ----------
     tool
-        The tool, of which nothing has to be imported.
+        The tool, which need not be imported.
     """
 
     def __init__(self, tool: Any) -> None:
@@ -57,7 +57,7 @@ class UnavailableAlgorithm(NamedAlgorithm):
     Parameters
     ----------
     tool
-        Which tool.
+        The tool.
     reason
         What is missing, in one line.
     """
@@ -76,7 +76,7 @@ class UnavailableAlgorithm(NamedAlgorithm):
         return help_url("qgis")
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:
-        """Declare nothing: the parameters are in what cannot be imported."""
+        """Declare nothing, as the parameters are in a module that cannot be imported."""
 
     def canExecute(self) -> tuple[bool, str]:
         return False, self._reason
@@ -84,7 +84,7 @@ class UnavailableAlgorithm(NamedAlgorithm):
     def checkParameterValues(
         self, parameters: dict[str, Any], context: QgsProcessingContext
     ) -> tuple[bool, str]:
-        # qgis_process and models do not ask canExecute
+        # qgis_process and models do not call canExecute
         return False, self._reason
 
     def processAlgorithm(

@@ -1,4 +1,4 @@
-"""Reads the values of Processing parameters as the tools take them."""
+"""Converts the values of Processing parameters into the tools' values."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Reader:
     Parameters
     ----------
     algorithm, parameters, context
-        As Processing hands them over; the context loads outputs that are layers.
+        As passed by Processing; the context loads outputs that are layers.
     feedback
-        Takes the messages of layers that must be written to a file first.
+        Receives messages about layers that must be written to a file first.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Reader:
         Raises
         ------
         ParameterError
-            A layer is not one of files.
+            A layer is not based on a file.
         """
         name, kind = qgis_name(parameter.name), parameter.kind
         given = self._parameters.get(name)
@@ -97,19 +97,19 @@ class Reader:
     def _raster(self, kind: Any, name: str, given: Any) -> Any:
         layer = self._algorithm.parameterAsRasterLayer(self._parameters, name, self._context)
         if layer is None:
-            return given  # the library reports better than QGIS what is wrong with it
+            return given  # the library's error message is better than QGIS's
         return _file_of(layer, kind)
 
     def _rasters(self, kind: Any, name: str, given: Any) -> Any:
         layers = self._algorithm.parameterAsLayerList(self._parameters, name, self._context)
         names = [given] if isinstance(given, str) else list(given)
         if len(layers) < len(names):
-            return names  # folders, patterns and tables are no layers
+            return names  # folders, patterns and tables are not layers
         return [_file_of(layer, kind) for layer in layers]
 
     def _mask(self, kind: Any, name: str, given: Any) -> Any:
         if isinstance(given, str) and Path(given).is_file():
-            return given  # a classifier is no layer, and GDAL may take it for one
+            return given  # a classifier is not a layer, but GDAL may take it for one
         layer = self._algorithm.parameterAsLayer(self._parameters, name, self._context)
         if isinstance(layer, QgsVectorLayer):
             return self._vector(name, given)
@@ -128,10 +128,10 @@ def with_layers_as_files(
     parameters: dict[str, Any],
     context: QgsProcessingContext,
 ) -> dict[str, Any]:
-    """Return the parameters of a call with layers of points written to files, as they are now.
+    """Return the parameters of a call, with layers of points written to files as they are now.
 
-    Edits that are not saved count, and so does the layer's filter. To be called in the main
-    thread, where the layers live.
+    The files include unsaved edits and respect the layer's filter. Call this in the main thread,
+    to which the layers belong.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def with_layers_as_files(
 def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) -> str:
     options = QgsVectorFileWriter.SaveVectorOptions()
     options.driverName = "GPKG"
-    # Those of new features are not numbers yet.
+    # The fids of new features are not numbers yet.
     options.attributes = [
         index for index, field in enumerate(layer.fields()) if field.name().lower() != "fid"
     ]

@@ -1,4 +1,4 @@
-"""The dock's verdict: a coloured heading, and what the tool stated."""
+"""The dock's verdict: a coloured heading and the tool's statements."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .translation import tr
 from .wording import in_words
 
 _GREEN, _RED = "#1a7f37", "#b3261e"
-# How many lines of a result are shown: its report has the others.
+# Largest number of result lines shown; the report has the others.
 _MOST_LINES = 6
 
 
 class VerdictLabel(QLabel):
-    """States whether two layers were registered, and what came of it or why not."""
+    """States whether two layers were registered, with the result or the reason."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -26,7 +26,7 @@ class VerdictLabel(QLabel):
         self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
 
     def state(self, good: bool, text: str, layers: tuple[Any, ...]) -> None:
-        """Show a verdict; files of `layers` are named as these are."""
+        """Show a verdict, in which the files of `layers` have the layers' names."""
         heading = tr("✔ Accepted") if good else tr("✘ Not registered")
         for layer in layers:
             text = text.replace(file_name(layer), layer.name())
@@ -38,5 +38,5 @@ class VerdictLabel(QLabel):
 
 
 def first_lines(lines: tuple[str, ...]) -> str:
-    """Return the first of what a tool stated of its result."""
+    """Return the first lines of a tool's result."""
     return "\n".join(lines[:_MOST_LINES])

@@ -1,4 +1,4 @@
-"""Writes the image that points under a person's hands give."""
+"""Writes the image that results from the points edited by the user."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .start_files import points_name
 
 
 class Writer:
-    """Runs *Warp a raster*, or what an image with RPCs takes.
+    """Runs *Warp a raster*, or the steps for an image with RPCs.
 
     Parameters
     ----------
@@ -30,16 +30,16 @@ class Writer:
     def start(
         self, review: Any, fit: Any, reference: Any, input: Any, sensor: SensorImage | None
     ) -> str:
-        """Begin; return why not, or an empty text.
+        """Start writing; return the reason if that is not possible, otherwise an empty text.
 
         Parameters
         ----------
         review, fit
-            The points, and the model that is fitted to them.
+            The points and the model fitted to them.
         reference, input
             The layers.
         sensor
-            The image with RPCs that is written in place of the input; None: the input is.
+            The image with RPCs that is written in place of the input; None: write the input.
         """
         points = new_file(points_name())
         try:

@@ -1,4 +1,4 @@
-"""The error of a sensor model: from true to nominal image positions of the ground."""
+"""The error of a sensor model, as a mapping from true to nominal image positions."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .noise import Stream, random_stream
 
 @dataclass(frozen=True)
 class AttitudeOptions:
-    """How large the error is; its directions are drawn.
+    """Size of the error; its directions are random.
 
     Attributes
     ----------
     shift_m : float
-        Length of the shift on the ground: an error of position, pitch and roll.
+        Length of the shift on the ground, an error of position, pitch and roll.
     drift_px : float
-        How much the shift changes from the first line to the last one.
+        Change of the shift from the first line to the last one.
     rotation_deg : float
-        Rotation about the centre of the image: an error of yaw.
+        Rotation about the centre of the image, an error of yaw.
     """
 
     shift_m: float = 60.0
@@ -31,7 +31,7 @@ class AttitudeOptions:
     rotation_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.shift_m < 0 or self.drift_px < 0 or abs(self.rotation_deg) > 1:
             raise ParameterError(
                 "shift and drift must not be negative, the rotation of a sensor at most 1°"
@@ -66,7 +66,7 @@ class AttitudeError:
         return cls(np.column_stack([linear, moved - linear @ centre]))
 
     def __call__(self, px: FloatArray) -> FloatArray:
-        """Return the nominal positions, shape (n, 2), of true ones."""
+        """Return the nominal positions, shape (n, 2), for true positions."""
         return np.asarray(px @ self.matrix[:, :2].T + self.matrix[:, 2])
 
     def inverse(self) -> AttitudeError:

@@ -1,4 +1,4 @@
-"""City blocks: where their buildings stand and how high they are."""
+"""City blocks: positions and heights of their buildings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LOT_M = 22.0
 
 @dataclass(frozen=True)
 class Building:
-    """A building or a part of one, drawn over the parts before it.
+    """A building, made of parts of which later ones are drawn over earlier ones.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ Builder = Callable[[Polygon, float, np.random.Generator], list[Building]]
 
 @dataclass(frozen=True)
 class Quarter:
-    """How a part of a city is built.
+    """A type of city quarter.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Quarter:
     street_m : tuple of float
         Narrowest and widest streets, with pavements.
     build : function
-        Buildings of a block, from its outline, the pixels for a metre and a generator.
+        Returns the buildings of a block from its outline, the pixels per metre and a generator.
     ground : Cover
-        What lies between the buildings.
+        Cover between the buildings.
     trees_per_m2 : float
         Trees between the buildings.
     """
@@ -97,7 +97,7 @@ def perimeter(block: Polygon, scale: float, generator: np.random.Generator) -> l
 
 
 def lots(block: Polygon, scale: float, generator: np.random.Generator) -> list[Building]:
-    """Closely built lots, mostly of middle height."""
+    """Densely built lots, mostly of medium height."""
     buildings = []
     for lot in subdivide(block, 1100 * scale**2, 0.0, generator).cells:
         fill = (generator.uniform(0.85, 0.98), generator.uniform(0.85, 0.98))
@@ -127,7 +127,7 @@ def towers(block: Polygon, scale: float, generator: np.random.Generator) -> list
 
 
 def slabs(block: Polygon, scale: float, generator: np.random.Generator) -> list[Building]:
-    """Parallel slabs of flats, far enough apart for some sun."""
+    """Parallel apartment slabs, spaced for sunlight."""
     centre, half, angle = main_frame(block)
     height_m = generator.uniform(15, 36)
     depth = generator.uniform(5.5, 7.5) * scale
@@ -168,7 +168,7 @@ QUARTERS = (
 def _with_roof(
     outline: Polygon, height_m: float, scale: float, generator: np.random.Generator
 ) -> Building:
-    """A building with stairheads and machinery on its flat roof."""
+    """A building with stair heads and plant rooms on its flat roof."""
     parts = [(outline, height_m)]
     centre, half, angle = main_frame(outline)
     for _ in range(int(generator.poisson(min(area(outline) / (500 * scale**2), 4)))):

@@ -1,8 +1,8 @@
-"""A push-broom camera in orbit: collinearity with a perspective centre of its own for each line.
+"""A push-broom camera in orbit: collinearity with a separate perspective centre for each line.
 
-Positions are (x, y, height) in metres: the map's plane and heights above the ellipsoid, taken for
-Cartesian. Over a scene of some kilometres the satellite flies straight on and does not turn, so
-that both directions, ground to image and image to ground, are closed formulas.
+Positions are (x, y, height) in metres: map coordinates and heights above the ellipsoid, treated as
+Cartesian. Over a scene of some kilometres the satellite flies straight and does not rotate, so that
+both ground to image and image to ground have closed forms.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from ..rasters.grid import FloatArray
 
 @dataclass(frozen=True)
 class PushBroom:
-    """A line of detectors that is carried along.
+    """A moving detector line.
 
     Attributes
     ----------
     centre_px : float64 array (2,)
-        Image position (col, row) that looks along `view`.
+        Image position (col, row) whose line of sight is `view`.
     position_m : float64 array (3,)
-        Perspective centre when the centre's line is exposed.
+        Perspective centre when the line of `centre_px` is exposed.
     step_m : float64 array (3,)
-        How far it moves from line to line.
+        Motion of the perspective centre from line to line.
     view, across : float64 array (3,)
-        Unit vectors, perpendicular to each other: where the centre looks, and where columns run.
+        Perpendicular unit vectors: line of sight of the centre, and direction of columns.
     focal_px : float
         Focal length in detectors.
     """
@@ -56,17 +56,17 @@ class PushBroom:
         Parameters
         ----------
         target_m : tuple of float
-            What the centre of the image shows.
+            Ground position at the centre of the image.
         size_px : tuple of int
             Width and height of the image.
         pixel_m : float
-            Distance of lines on the ground, and size of a detector across the line of sight.
+            Line spacing on the ground, and pixel size at the target across the line of sight.
         view_azimuth_deg, off_nadir_deg : float
-            Where the camera is, seen from the target, clockwise from north and from the vertical.
+            Direction from the target to the camera, clockwise from north and from the vertical.
         heading_deg : float
-            Where it flies to, clockwise from north.
+            Flight direction, clockwise from north.
         altitude_m : float
-            Its height above the target.
+            Height of the camera above the target.
         """
         azimuth, off_nadir, heading = np.radians([view_azimuth_deg, off_nadir_deg, heading_deg])
         upwards = np.array(
@@ -91,7 +91,8 @@ class PushBroom:
     def project(self, ground_m: FloatArray) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions (n, 3).
 
-        A point is seen when the plane of the detectors and the perspective centre sweeps over it.
+        A point is imaged when the plane through the detector line and the perspective centre
+        sweeps over it.
         """
         offset = ground_m - self.position_m
         normal = np.cross(self.view, self.across)
@@ -101,7 +102,10 @@ class PushBroom:
         return np.column_stack([columns, lines]) + self.centre_px
 
     def localise(self, px: FloatArray, height_m: FloatArray | float) -> FloatArray:
-        """Return the map positions (x, y), shape (n, 2), that are seen at heights, (n,) or one."""
+        """Return the map positions (x, y), shape (n, 2), of image positions at heights.
+
+        Heights have shape (n,), or are one number.
+        """
         columns, lines = (px - self.centre_px).T
         origin = self.position_m + lines[:, None] * self.step_m
         ray = self.view + columns[:, None] / self.focal_px * self.across

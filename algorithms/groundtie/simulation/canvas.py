@@ -1,4 +1,4 @@
-"""A label image that parcels are drawn into, and shapes that all layouts share."""
+"""A label image to draw parcels into, and shapes that all layouts share."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PROBES_PER_SIDE = 6
 
 
 class Acquisition(IntEnum):
-    """Which of the two images of a place is taken."""
+    """The acquisition of one of the two images."""
 
     RADAR = 0
     CAMERA = 1
@@ -33,16 +33,16 @@ When = tuple[Acquisition, ...]
 
 @dataclass(frozen=True)
 class Standing:
-    """Something on the ground.
+    """An object on the ground.
 
     Attributes
     ----------
     outline : list of points
         Convex outline in pixels (column, row).
     parcel : int
-        Its number.
+        Number of its parcel.
     when : tuple of Acquisition
-        In which images it stands.
+        Acquisitions at which it stands.
     """
 
     outline: Polygon
@@ -52,7 +52,7 @@ class Standing:
 
 @dataclass(frozen=True)
 class Tree:
-    """A tree, which grows where its root is not on certain covers."""
+    """A tree, which is drawn unless its root is on one of the covers `keep_off`."""
 
     outline: Polygon
     parcel: int
@@ -62,21 +62,22 @@ class Tree:
 
 @dataclass(frozen=True)
 class Changes:
-    """Draws which buildings stand in one of the images only.
+    """Draws the buildings that stand at only one acquisition.
 
     Attributes
     ----------
     share : float
-        How many of them: half are pulled down after the radar's image, half are new by then.
+        Share of such buildings: half stand only at the radar's acquisition, half only at the
+        camera's.
     generator : numpy.random.Generator
-        Source of what changes.
+        Source of the changes.
     """
 
     share: float
     generator: np.random.Generator
 
     def draw(self) -> When:
-        """Draw when the next building stands."""
+        """Draw the acquisitions at which the next building stands."""
         drawn = self.generator.random()
         if drawn >= self.share:
             return BOTH
@@ -85,7 +86,7 @@ class Changes:
 
 @dataclass
 class Canvas:
-    """Draws parcels: the ground at once, what stands on it for each of the images.
+    """Draws parcels: the ground once, the objects on it for each acquisition.
 
     Attributes
     ----------
@@ -98,7 +99,7 @@ class Canvas:
     book : ParcelBook
         Receives the parcels.
     changes : Changes
-        What changes between the images.
+        Changes between the acquisitions.
     """
 
     shape: tuple[int, int]
@@ -120,7 +121,7 @@ class Canvas:
         Returns
         -------
         two int32 arrays (rows, columns)
-            One and the same if nothing has changed.
+            Both are the same array if nothing has changed.
         """
         radar = self._with_things(Acquisition.RADAR)
         if all(isinstance(thing, Tree) or thing.when == BOTH for thing in self._things):
@@ -140,18 +141,18 @@ class Canvas:
         return drawn
 
     def _rotated_outline(self) -> Polygon:
-        """Draw a rotated square that reaches beyond the scene on all sides: streets follow it."""
+        """Draw a rotated square that covers the scene and gives the direction of streets."""
         height, width = self.labels.shape
         half = math.hypot(height, width) / 2
         angle = self.generator.uniform(0, math.pi / 2)
         return rectangle((width / 2, height / 2), (half, half), angle)
 
     def _touches(self, outline: Polygon, covers: tuple[Cover, ...]) -> bool:
-        """Whether the ground along an outline is of certain covers."""
+        """Whether the ground has one of the covers anywhere along an outline."""
         return any(self._cover_at(p) in covers for p in points_along(outline, _PROBES_PER_SIDE))
 
     def _scatter_trees(self, polygon: Polygon, mean_count: float, share: float = 0.9) -> None:
-        """Draw places of trees in the middle share of the box around a polygon."""
+        """Draw positions of trees in the central `share` of the box around a polygon."""
         centre, half, angle = main_frame(polygon)
         for _ in range(int(self.generator.poisson(mean_count))):
             u, v = (self.generator.uniform(-share, share) * h for h in half)
@@ -160,7 +161,7 @@ class Canvas:
     def _plant_trees(
         self, kinds: int, highest_m: float, crown_m: float, keep_off: tuple[Cover, ...]
     ) -> None:
-        """Let trees grow in their places, with crowns of `crown_m` to 4 m in radius."""
+        """Add trees at the drawn positions, with crown radii of `crown_m` to 4 m."""
         parcels = [
             self._add(Cover.FOREST, self.generator.uniform(4, highest_m)) for _ in range(kinds)
         ]
@@ -196,7 +197,7 @@ class Canvas:
 
     def _blob(self, centre: Point, radius: float) -> Polygon:
         turn = np.linspace(0, 2 * math.pi, 60, endpoint=False)
-        # The outline follows the place, so that the bank runs along the shore.
+        # The phase depends only on the centre, so that the bank runs parallel to the shore.
         wobble = 0.22 * np.sin(2 * turn + centre[0]) + 0.12 * np.sin(3 * turn + centre[1])
         reach = radius * (1 + wobble)
         x, y = centre[0] + reach * np.cos(turn), centre[1] + 0.8 * reach * np.sin(turn)

@@ -1,4 +1,4 @@
-"""Places whose positions in both images are known exactly: on open ground, and on roofs."""
+"""Points on open ground and on roofs whose positions in both images are known exactly."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ITERATIONS = 30
 
 @dataclass(frozen=True)
 class RoofPoints:
-    """Points on flat roofs that stand in both images and are seen by both sensors.
+    """Points on flat roofs that stand at both acquisitions and are visible to both sensors.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class RoofPoints:
     height_m : float64 array (n,)
         Height above the ground.
     reference_px, input_px : float64 array (n, 2)
-        Where the images show them; in the input moved as the ground there is. A radar image shows
-        them nearer to the radar by height / tan(incidence) on level ground, an optical one away
-        from the camera by height · tan(off-nadir angle).
+        Positions in the images; those in the input include the misregistration of the ground. On
+        level ground, a radar image displaces them towards the radar by height / tan(incidence), an
+        optical image away from the camera by height · tan(off-nadir angle).
     """
 
     px: FloatArray
@@ -50,28 +50,28 @@ class RoofPoints:
 
 @dataclass(frozen=True)
 class InputImage:
-    """Where the input shows the ground.
+    """The mapping from the ground to the input image.
 
     Attributes
     ----------
     to_px : function
-        From reference pixels (col, row) of places on the ground to those of the image, (n, 2).
+        Maps reference pixels (col, row) of points on the ground to image pixels, (n, 2).
     grid : Grid
-        The image's pixels.
+        Pixel grid of the image.
     """
 
     to_px: Callable[[FloatArray], FloatArray]
     grid: Grid
 
     def seen(self, px: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return image positions of reference pixels, (..., 2), and which the image shows."""
+        """Return image positions of reference pixels, (..., 2), and a mask of those inside."""
         shown = self.to_px(px.reshape(-1, 2))
         inside = self.grid.contains(shown)
         return shown.reshape(px.shape), inside.reshape(px.shape[:-1])
 
 
 def ground_points(scenes: Scenes, grid: Grid, image: InputImage) -> FloatArray:
-    """Return one point on open ground in each cell of a lattice, where there is one.
+    """Return one point on open ground in each cell of a lattice that has one.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def roof_points(
     optical: OpticalOptions,
     radar_is_input: bool = False,
 ) -> RoofPoints:
-    """Return one point on a roof in each cell of a lattice, where both sensors see one."""
+    """Return one roof point in each cell of a lattice that has one visible to both sensors."""
     px, place = _drawn(scenes.radar, grid, Stream.ROOF_POINTS)
     height_m = scenes.radar.object_m[place].astype(float)
     shown = radar_position(scenes.radar, px, height_m, sar)
@@ -112,9 +112,9 @@ def roof_points(
 def radar_position(
     scene: Scene, px: FloatArray, height_m: FloatArray, sar: SarOptions
 ) -> FloatArray:
-    """Return where the geocoded radar image shows points above the ground.
+    """Return the positions of elevated points in the geocoded radar image.
 
-    The radar measures the slant range alone; the bare terrain gives the ground at that range.
+    The radar measures only the slant range; geocoding takes the bare terrain at that range.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def radar_position(
 
     def terrain_m(x: FloatArray) -> FloatArray:
         place = np.stack([row, x]) + scene.margin_px
-        # As the radar image does, each row on its own, and along it between the pixels.
+        # As in the radar image: no interpolation across rows, linear interpolation along them.
         place[0] = np.rint(place[0])
         return np.asarray(map_coordinates(scene.terrain_m, place, float, order=1, mode="nearest"))
 
@@ -141,7 +141,7 @@ def radar_position(
 def camera_position(
     scene: Scene, px: FloatArray, height_m: FloatArray, optical: OpticalOptions
 ) -> FloatArray:
-    """Return where an optical image without misregistration shows points above the ground."""
+    """Return the positions of elevated points in an optical image without misregistration."""
     towards_camera = np.array(direction(optical.view_azimuth_deg))
     return np.asarray(
         px - towards_camera * (height_m * optical.lean / scene.pixel_size_m)[..., None]
@@ -151,7 +151,7 @@ def camera_position(
 def _drawn(
     scene: Scene, grid: Grid, stream: Stream
 ) -> tuple[FloatArray, tuple[IntArray, IntArray]]:
-    """Places in each cell of a lattice: reference pixels, and (row, column) of the scene."""
+    """Draw places in each cell of a lattice: reference pixels and scene (row, column)."""
     side = np.arange(_PER_SIDE)
     cell = mesh(side, side)[:, None]
     drawn = random_stream(scene.seed, stream).random((len(cell), _TRIES, 2))
@@ -161,13 +161,13 @@ def _drawn(
 
 
 def _first_of_each(values: FloatArray, usable: npt.NDArray[np.bool_]) -> FloatArray:
-    """Values of the first usable place of each cell that has one."""
+    """Return the values at the first usable place of each cell that has one."""
     first, has_one = usable.argmax(axis=1), usable.any(axis=1)
     return np.asarray(values[np.nonzero(has_one)[0], first[has_one]])
 
 
 def _inside_a_roof(scenes: Scenes, place: tuple[IntArray, IntArray]) -> npt.NDArray[np.bool_]:
-    """Whether the same roof is all around a place in both images."""
+    """Whether the same roof surrounds a place in both scenes."""
     row, column = place
     number = scenes.radar.parcel[place]
     inside = scenes.radar.parcels.cover[number] == Cover.BUILDING
@@ -204,7 +204,7 @@ def _hidden(
     step: tuple[float, float],
     rise: float,
 ) -> npt.NDArray[np.bool_]:
-    """Whether the ray that rises towards a sensor meets something; `step` is (columns, rows)."""
+    """Whether the ray that rises towards a sensor is blocked; `step` is (columns, rows)."""
     row, column = place
     height_px = height_m / np.float32(scene.pixel_size_m)
     ray, highest = height_px[place], float(height_px.max())

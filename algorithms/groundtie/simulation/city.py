@@ -45,7 +45,7 @@ class _Street:
     trees: bool
 
     def carriageway(self, kerb: float) -> Polygon:
-        """Return the part for cars, which reaches into the streets at both ends."""
+        """Return the carriageway, which extends into the streets at both ends."""
         centre, half, angle = main_frame(self.lane)
         return rectangle(centre, (half[0] + (kerb + 1), self.half_width - kerb), angle)
 
@@ -59,7 +59,7 @@ class CityLayout(Canvas):
     shape, px_per_m, generator, book, changes
         See `Canvas`.
     traffic : numpy.random.Generator
-        Source of cars and trains, which differ in the two images.
+        Source of cars and trains, which differ between the acquisitions.
     """
 
     traffic: np.random.Generator
@@ -115,7 +115,7 @@ class CityLayout(Canvas):
         self._scatter_over(block, quarter.trees_per_m2)
 
     def _draw_streets(self, streets: list[_Street]) -> None:
-        """Draw pavements, then carriageways, so that no pavement runs across a junction."""
+        """Draw pavements before carriageways, so that no pavement crosses a junction."""
         for street in streets:
             self._fill(street.lane, self._add(Cover.PAVEMENT))
         asphalt = [self._add(Cover.ASPHALT) for _ in range(_KINDS)]
@@ -167,11 +167,11 @@ class CityLayout(Canvas):
                 self._things.append(Standing(part, roof, when))
 
     def _park_cars(self, streets: list[_Street]) -> None:
-        """Put cars along the kerbs and on the lanes, others in each image."""
+        """Add cars along the kerbs and on the lanes, different ones at each acquisition."""
         if self.px_per_m * _CAR_M[1] < 1:
             return
         kinds = [self._add(Cover.CAR, 1.5) for _ in range(_KINDS)]
-        # Pixels that are touched are filled: half of one is taken off on all sides.
+        # Filling includes all touched pixels: outlines are reduced by 0.4 px on all sides.
         half_car = (_CAR_M[0] / 2 * self.px_per_m - 0.4, _CAR_M[1] / 2 * self.px_per_m - 0.4)
         for street in streets:
             *_, angle = main_frame(street.lane)
@@ -188,7 +188,7 @@ class CityLayout(Canvas):
                             self._things.append(Standing(car, kinds[int(kind * _KINDS)], (when,)))
 
     def _places(self, lane: Polygon, offset: float, pitch_m: float) -> list[Point]:
-        """Places in the scene at even distances along a lane."""
+        """Return evenly spaced places along a lane, within the scene."""
         centre, half, angle = main_frame(lane)
         cos, sin = math.cos(angle), math.sin(angle)
         along = np.arange(-half[0], half[0], pitch_m * self.px_per_m)

@@ -1,8 +1,8 @@
-"""Land cover classes and how bright each looks to a radar and to a camera.
+"""Land cover classes with their radar backscatter and optical reflectance.
 
-Backscatter follows X-band at medium incidence (order of magnitude of [Ulaby1989]); reflectances are
-those of common spectral libraries, rounded. Both are drawn independently of one another, so that
-their relation holds by class and is not monotonic.
+Backscatter is that of X-band at medium incidence (order of magnitude of [Ulaby1989]). Reflectances
+are rounded values of common spectral libraries. Both are drawn independently, so that they are
+related only through the class, and not monotonically.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Reflectance = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class _Surface:
-    """Range of the backscatter (dB) and the possible spectra of one class."""
+    """Backscatter range (dB) and possible spectra of one class."""
 
     backscatter_db: tuple[float, float]
     spectra: tuple[Reflectance, ...]
@@ -107,8 +107,8 @@ class ParcelTable:
     rows_rad : float32 array (n,)
         Direction across the plough rows of a field or the tracks of a railway.
     window_m : float32 array (n,)
-        Spacing of the windows of a building's walls, whose corners glitter to the radar; 0 where
-        the walls are plain.
+        Spacing of the windows in a building's walls, whose corners are bright radar targets; 0
+        for plain walls.
     wall_reflectance : float32 array (n,)
         Reflectance of the walls, in all bands.
     """

@@ -1,4 +1,4 @@
-"""A simulated pair as files."""
+"""Output files of a simulated pair."""
 
 from __future__ import annotations
 
@@ -40,15 +40,16 @@ ROOF_POINT_COLUMNS = ("x", "y", "height_m", *CHECK_POINT_COLUMNS[2:])
 
 
 def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
-    """Write a pair into a folder, which is made if need be; all files appear or none.
+    """Write a pair into a folder, which is created if needed; all files appear or none.
 
     Returns
     -------
     dict
         Paths of reference, input, dem (bare ground in metres on the reference's pixels), input_dem
-        (what the input was orthorectified with, on these and around, if it is wrong), dsm (the
-        ground with buildings and trees, and beyond), reference_metadata and input_metadata (STAC
-        items), truth (JSON, which `load_transform` reads), check_points and roof_points (CSV).
+        (heights that the input was orthorectified with, only if they have errors), dsm (ground with
+        buildings and trees), reference_metadata and input_metadata (STAC items), truth (JSON, which
+        `load_transform` reads), check_points and roof_points (CSV). input_dem and dsm extend beyond
+        the reference.
 
     Raises
     ------
@@ -87,11 +88,11 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
 
 
 def truth_json(pair: SimulatedPair) -> dict[str, Any]:
-    """Return the truth with all that it was drawn from.
+    """Return the truth and the options that it was drawn from.
 
-    It is the JSON of the `Transform`, plus `seed`, `sigma_px` (0: exact), `options` and, if it is
-    affine, `reference_to_input` and `map_to_input`: the 2×3 matrices that take reference pixel
-    (col, row, 1) and reference map position (x, y, 1) to input pixel (col, row).
+    It is the JSON of the `Transform`, plus `seed`, `sigma_px` (0: exact) and `options`. An affine
+    truth also has `reference_to_input` and `map_to_input`: the 2×3 matrices that map reference
+    pixel (col, row, 1) and reference map position (x, y, 1) to input pixel (col, row).
     """
     values = {
         **pair.truth.to_json(),
@@ -110,7 +111,7 @@ def truth_json(pair: SimulatedPair) -> dict[str, Any]:
 
 
 def _matrix(function: Callable[[FloatArray], FloatArray], centre: FloatArray) -> list[list[float]]:
-    """Return the 2×3 matrix of an affine function of the plane, from its values at the centre."""
+    """Return the 2×3 matrix of an affine function of the plane, from values around the centre."""
     step = 1000.0
     base, along_x, along_y = function(centre + [[0, 0], [step, 0], [0, step]])
     linear = np.column_stack([along_x - base, along_y - base]) / step

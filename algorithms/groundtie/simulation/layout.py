@@ -1,7 +1,7 @@
-"""Where the parcels of a scene lie: districts, streets, fields, woods, waters and buildings.
+"""Layout of a scene's parcels: districts, streets, fields, woods, water bodies and buildings.
 
-Everything is drawn into one label image, later parcels over earlier ones: ground, waters, arterial
-roads (which bridge waters), buildings and trees.
+Parcels are drawn into one label image, later ones over earlier ones: ground, water bodies, arterial
+roads (which bridge them), buildings and trees.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .polygons import (
 
 @dataclass(frozen=True)
 class Use:
-    """How a district is built: street width, block and lot area, share of the lot, heights."""
+    """Land use of a district: street width, block and lot area, built share, heights, trees."""
 
     street_m: float
     block_m2: float
@@ -57,13 +57,13 @@ _LAKE_M2 = 400_000
 
 
 def highest_object_m(density: str) -> float:
-    """Return the greatest height that a building or a canopy of a scene can have."""
+    """Return the greatest possible height of a building or a canopy in a scene."""
     return max(CANOPY_M[1], *(use.height_m[1] for use, _ in DENSITIES[density]))
 
 
 @dataclass
 class Layout(Canvas):
-    """Draws the parcels of a scene in the country or of a town.
+    """Draws the parcels of a rural, suburban or urban scene.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class Layout(Canvas):
             fill = (self.generator.uniform(*use.fill), self.generator.uniform(*use.fill))
             footprint = fitted_rectangle(lot, fill)
             if footprint is not None:
-                # Squared and more: many low buildings, few towers.
+                # The exponent makes low buildings common and towers rare.
                 share = self.generator.random() ** 2.5
                 low, high = use.height_m
                 self._buildings.append((footprint, low + (high - low) * share))
@@ -151,7 +151,7 @@ class Layout(Canvas):
             self._trees.append((place[0] + 1.4 * size[0], place[1] + 1.6 * size[1]))
 
     def _draw_waters(self) -> None:
-        """Draw all banks, then all waters, so that no bank runs through another water."""
+        """Draw all banks before all water, so that no bank crosses another water body."""
         height, width = self.labels.shape
         shores = [self._river((6, 14), 5)]
         area_m2 = height * width / self.px_per_m**2

@@ -1,4 +1,4 @@
-"""What products state of how they were seen: STAC items with the view extension [STAC2021]."""
+"""Acquisition metadata of products: STAC items with the view extension [STAC2021]."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _VIEW = "https://stac-extensions.github.io/view/v1.0.0/schema.json"
 _SAR = "https://stac-extensions.github.io/sar/v1.0.0/schema.json"
 _SAT = "https://stac-extensions.github.io/sat/v1.0.0/schema.json"
 
-# An item must have a date; this place is invented, and so is its time.
+# An item must have a date; for a simulated place, the date is invented, too.
 _DATE = "2020-06-01T10:00:00Z"
 
 
@@ -32,7 +32,7 @@ def sar_item(file: str, grid: Grid, sar: SarOptions) -> dict[str, Any]:
 
 
 def optical_item(file: str, grid: Grid, optical: OpticalOptions) -> dict[str, Any]:
-    """Return the STAC item of a camera's image that shows a grid."""
+    """Return the STAC item of a camera image that covers a grid."""
     properties = {
         "view:azimuth": (optical.view_azimuth_deg + 180) % 360,
         "view:off_nadir": optical.off_nadir_deg,

@@ -1,4 +1,4 @@
-"""Misregistrations with exactly known parameters, and images that carry them."""
+"""Misregistrations with exactly known parameters, and the resampling that applies them."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ _SPLINE_REACH_PX = 4
 
 @dataclass(frozen=True)
 class DistortionOptions:
-    """How far off the input's georeferencing is.
+    """Kind and size of the error of the input's georeferencing.
 
     Attributes
     ----------
     kind : str
         One of `DISTORTIONS`.
     shift_px : float
-        Length of the shift in input pixels; its direction is drawn.
+        Length of the shift in input pixels; its direction is random.
     rotation_deg : float
         Rotation of the content, counter-clockwise on the map ("rotation" and "similarity").
     scale : float
         Enlargement of the content ("scale" and "similarity").
     warp_px : float
-        Largest displacement besides the shift, in input pixels ("affine" and "polynomial").
+        Largest displacement in addition to the shift, in input pixels ("affine" and "polynomial").
     """
 
     kind: str = "affine"
@@ -59,7 +59,7 @@ class DistortionOptions:
     warp_px: float = 4.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.kind not in DISTORTIONS:
             names = ", ".join(DISTORTIONS)
             raise ParameterError(f"distortion must be one of {names}, not {self.kind!r}")
@@ -73,7 +73,7 @@ def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> P
     Parameters
     ----------
     options : DistortionOptions
-        Kind and size.
+        Kind and size of the misregistration.
     grid : Grid
         Nominal georeferencing of the input.
     seed : int
@@ -106,8 +106,8 @@ def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> P
 def _drawn_warp(
     generator: np.random.Generator, terms: int, degree: int, largest: float
 ) -> npt.NDArray[np.float64]:
-    """Coefficients above the constant whose displacement is at most `largest` in the frame."""
-    # A warp that folds the plane has no inverse; these stay far from that.
+    """Draw non-constant coefficients with a displacement of at most `largest` in the frame."""
+    # A warp that folds the plane has no inverse; the limit stays far from that.
     if largest > 0.1:
         raise ParameterError("warp must be less than a twentieth of the input's longer side")
     drawn = generator.uniform(-1, 1, (terms, 2))
@@ -117,7 +117,7 @@ def _drawn_warp(
 
 
 def needed_margin(model: Model, reference: Grid, nominal: Grid) -> int:
-    """Return how many pixels the input's ground reaches beyond the reference image."""
+    """Return the margin, in pixels, that the input's ground needs around the reference image."""
     outline = Transform(model, reference.crs, nominal).inverse(nominal.outline())
     px = reference.map_to_pixel(outline)
     beyond = np.maximum(-px, px - [reference.width - 1, reference.height - 1])
@@ -126,15 +126,15 @@ def needed_margin(model: Model, reference: Grid, nominal: Grid) -> int:
 
 @dataclass(frozen=True)
 class Positions:
-    """Where the pixels of an image lie on the pixels of the scene.
+    """Positions of an image's pixels on the pixel grid of the scene.
 
     Attributes
     ----------
     shape : tuple of int
         Rows and columns of the image.
     strip : function
-        From the first row and the one after the last to scene (row, column) of the pixels between,
-        shape (2, rows, columns).
+        Maps the first row and the row after the last to the scene (row, column) of the pixels
+        between them, shape (2, rows, columns).
     """
 
     shape: tuple[int, int]
@@ -144,8 +144,8 @@ class Positions:
     def interpolated(cls, truth: Transform, scene_grid: Grid) -> Positions:
         """Return the positions of all pixels of the truth's input.
 
-        The exact inverse of the truth is taken at nodes; a bicubic spline through them returns any
-        affine map exactly and gentle polynomials to far below a thousandth of a pixel.
+        The truth is inverted exactly at nodes. A bicubic spline through them reproduces any affine
+        map exactly and gentle polynomials to far below a thousandth of a pixel.
         """
         width, height = truth.input_grid.size
         nodes = _nodes(height), _nodes(width)
@@ -160,7 +160,7 @@ class Positions:
 
     @classmethod
     def exact(cls, truth: Transform, scene_grid: Grid) -> Positions:
-        """Return the same, taken one by one: terrain is rough."""
+        """Return the same without interpolation, which rough terrain does not permit."""
         width, height = truth.input_grid.size
 
         def strip(start: int, stop: int) -> npt.NDArray[np.float64]:
@@ -179,7 +179,7 @@ def _on_scene(
 
 
 def resample(image: FloatImage, positions: Positions) -> FloatImage:
-    """Interpolate a scene's image (rows, columns) at the pixels of another by cubic B-splines."""
+    """Interpolate an image (rows, columns) of the scene at positions by cubic B-splines."""
     coefficients = spline_filter(image, order=3, output=np.float32, mode="mirror")
     result = np.empty(positions.shape, np.float32)
     for _, start, stop in strips(len(result)):

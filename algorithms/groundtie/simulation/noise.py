@@ -1,4 +1,4 @@
-"""Seeded random streams and smooth random fields, both readable strip by strip."""
+"""Seeded random streams and smooth random fields, both available strip by strip."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STRIP_ROWS = 256
 
 
 class Stream(IntEnum):
-    """What a random stream is drawn for, so that no two purposes share numbers."""
+    """Purposes of random streams; no two purposes share random numbers."""
 
     TERRAIN = 1
     LAYOUT = 2
@@ -36,12 +36,12 @@ class Stream(IntEnum):
 
 
 def random_stream(seed: int, stream: Stream, part: int = 0) -> np.random.Generator:
-    """Return the generator of one purpose and one part (a strip, an octave, a band) of it."""
+    """Return the generator for one purpose and one part of it (a strip, an octave, a band)."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, stream, part])))
 
 
 def strips(rows: int) -> Iterator[tuple[int, int, int]]:
-    """Yield (index, first row, row after the last) of the strips that cover `rows` rows."""
+    """Yield (index, first row, row after the last) of strips that cover `rows` rows."""
     for index, start in enumerate(range(0, rows, STRIP_ROWS)):
         yield index, start, min(start + STRIP_ROWS, rows)
 
@@ -68,10 +68,10 @@ class SmoothNoise:
     def draw(
         cls, shape: tuple[int, int], cell_px: float, generator: np.random.Generator
     ) -> SmoothNoise:
-        """Draw a field of about zero mean and unit standard deviation of (rows, columns)."""
+        """Draw a field of (rows, columns) with approximately zero mean and unit deviation."""
         nodes = [int(np.ceil(size / cell_px)) + 4 for size in shape]
         lattice = generator.standard_normal(tuple(nodes), dtype=np.float32)
-        # Mean of the sum of squared weights of a cubic B-spline is 151/315 in each direction.
+        # The sum of squared weights of a cubic B-spline has mean 151/315 in each direction.
         return cls(lattice * np.float32(315 / 151), cell_px, shape[1])
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float32]:
@@ -88,7 +88,7 @@ class SmoothNoise:
 def _spline_taps(
     position: npt.NDArray[np.float64],
 ) -> tuple[npt.NDArray[np.intp], list[npt.NDArray[np.float32]]]:
-    """First lattice node and the four cubic B-spline weights of each position."""
+    """Return the first lattice node and the four cubic B-spline weights of each position."""
     node = np.floor(position).astype(np.intp)
     f = position - node
     weights = [

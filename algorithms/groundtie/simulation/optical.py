@@ -1,8 +1,8 @@
-"""The radiance that a camera sees from off nadir, on the pixels of the scene.
+"""The radiance that an off-nadir camera receives, on the pixels of the scene.
 
-Terrain is orthorectified; buildings and trees are not: relief displacement moves them away from the
-camera by height · tan(off-nadir angle), over what is behind them. They cast shadows of the length
-height / tan(sun elevation).
+Terrain is orthorectified; buildings and trees are not. Relief displacement moves them away from the
+camera by height · tan(off-nadir angle), where they occlude the ground behind. They cast shadows of
+length height / tan(sun elevation).
 """
 
 from __future__ import annotations
@@ -36,20 +36,21 @@ _ROWS = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0], np.float3
 
 @dataclass(frozen=True)
 class OpticalOptions:
-    """How the camera looks and what the light is.
+    """Viewing geometry, illumination and quality of the camera image.
 
     Attributes
     ----------
     sun_azimuth_deg, sun_elevation_deg : float
-        Where the sun stands, clockwise from north and above the horizon.
+        Direction to the sun, clockwise from north and above the horizon.
     view_azimuth_deg, off_nadir_deg : float
-        Where the camera stands seen from the ground, clockwise from north and from the vertical.
+        Direction from the ground to the camera, clockwise from north and from the vertical.
     bands : tuple of str
         Any of "blue", "green", "red", "nir".
     psf_sigma_px : float
         Standard deviation of the Gaussian point spread function, in pixels of the input image.
     noise_dn : float
-        Standard deviation of the noise of a dark pixel; it grows with the root of the signal.
+        Standard deviation of the noise of a dark pixel; it grows with the square root of the
+        signal.
     """
 
     sun_azimuth_deg: float = 155.0
@@ -61,7 +62,7 @@ class OpticalOptions:
     noise_dn: float = 4.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if not 10 <= self.sun_elevation_deg <= 90:
             raise ParameterError(
                 f"sun_elevation_deg must be 10 to 90, not {self.sun_elevation_deg}"
@@ -75,17 +76,17 @@ class OpticalOptions:
 
     @property
     def lean(self) -> float:
-        """Metres of displacement for a metre of height."""
+        """Relief displacement in metres per metre of height."""
         return math.tan(math.radians(self.off_nadir_deg))
 
     @property
     def shadow(self) -> float:
-        """Metres of cast shadow for a metre of height."""
+        """Length of the cast shadow in metres per metre of height."""
         return 1 / math.tan(math.radians(self.sun_elevation_deg))
 
 
 def render_radiance(scene: Scene, options: OpticalOptions) -> FloatImage:
-    """Return the light that reaches the camera, before its optics and its noise.
+    """Return the radiance that reaches the camera, before its optics and its noise.
 
     Returns
     -------
@@ -128,7 +129,7 @@ def blur(image: FloatImage, sigma_px: float) -> None:
 def quantise(
     radiance: FloatImage, options: OpticalOptions, generator: np.random.Generator
 ) -> npt.NDArray[np.uint16]:
-    """Return 11-bit grey values from 1, with noise that grows with the root of the signal."""
+    """Return 11-bit grey values from 1, with noise that grows with the signal's square root."""
     signal = np.float32(_DARK_DN) + np.maximum(radiance, 0) * np.float32(_DN_PER_REFLECTANCE)
     if options.noise_dn > 0:
         noise = generator.standard_normal(signal.shape, dtype=np.float32)
@@ -137,18 +138,18 @@ def quantise(
 
 
 def _wall_light(options: OpticalOptions) -> float:
-    """Light on the walls that face the camera, which are taken as one plane."""
+    """Illumination of the walls that face the camera, which are treated as one plane."""
     turn = math.radians(options.sun_azimuth_deg - options.view_azimuth_deg)
     return _AMBIENT + (1 - _AMBIENT) * max(0.0, math.cos(turn)) * min(options.shadow, 1.0)
 
 
 def _illumination(scene: Scene, rows: slice, options: OpticalOptions) -> FloatImage:
-    """Light on ground, canopies and roofs: 1 on sunlit level ground."""
+    """Illumination of ground, canopies and roofs; 1 on sunlit level ground."""
     terrain = scene.terrain_m[rows] / np.float32(scene.pixel_size_m)
     objects = scene.object_m[rows] / np.float32(scene.pixel_size_m)
     down, along = np.gradient(terrain)
     east, south = direction(options.sun_azimuth_deg)
-    # Lambert's cosine over that of level ground.
+    # Lambert's cosine relative to that of level ground.
     direct = 1 - (along * east + down * south) * np.float32(options.shadow)
     direct = np.maximum(direct, 0) / np.sqrt(1 + along**2 + down**2)
     wood = scene.cover(rows) == Cover.FOREST
@@ -160,10 +161,10 @@ def _illumination(scene: Scene, rows: slice, options: OpticalOptions) -> FloatIm
 
 
 def _in_shadow(objects: FloatImage, options: OpticalOptions) -> npt.NDArray[np.bool_]:
-    """Return which surfaces have something between themselves and the sun.
+    """Return a mask of the surfaces that lie in cast shadow.
 
-    `shaded` is the height below which a point is in cast shadow of objects within some distance
-    towards the sun; each round doubles that distance. `ceiling` counts the point itself too.
+    `shaded` is the height below which a point is shaded by objects within some distance towards
+    the sun; each iteration doubles that distance. `ceiling` includes the point itself.
     """
     longest = float(objects.max()) * options.shadow
     if longest < 0.5:
@@ -180,12 +181,12 @@ def _in_shadow(objects: FloatImage, options: OpticalOptions) -> npt.NDArray[np.b
         shaded = np.maximum(shaded, moved)
         ceiling = np.maximum(ceiling, moved)
         distance *= 2
-    # What casts the shadow reaches half a pixel further than its centre.
+    # An object that casts a shadow extends half a pixel beyond its pixel's centre.
     return objects < shaded + np.float32(0.5 / options.shadow - _LEVEL_PX)
 
 
 def _from_place(image: FloatImage, columns: int, rows: int, outside: np.float32) -> FloatImage:
-    """Return the values that lie `columns` and `rows` further on."""
+    """Return an image whose values come from `columns` and `rows` further on."""
     moved = np.full(image.shape, outside, image.dtype)
     height, width = image.shape
     if abs(rows) < height and abs(columns) < width:
@@ -204,22 +205,22 @@ def _from_place(image: FloatImage, columns: int, rows: int, outside: np.float32)
 def _visible(
     scene: Scene, rows: slice, options: OpticalOptions, inside: slice
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """Find what the camera sees at each pixel of the map.
+    """Find the surface that the camera sees at each pixel of the map.
 
     Returns
     -------
     seen : array of the shape of the inside rows
         Flat index, within the context rows, of the pixel whose surface is seen.
     is_wall : bool array
-        Whether it is that pixel's wall instead of its roof.
+        Whether the surface is that pixel's wall instead of its roof.
     """
     objects = scene.object_m[rows] / np.float32(scene.pixel_size_m)
     width = objects.shape[1]
     place = np.arange(objects.size).reshape(objects.shape)[inside]
     if options.lean < 1e-6:
         return place, np.zeros(place.shape, bool)
-    # The ray to the camera rises with the distance from the pixel: of all things that reach up to
-    # the ray the farthest is what the camera sees.
+    # The ray to the camera rises with the distance from the pixel. The camera sees the farthest of
+    # all objects that reach up to the ray.
     east, south = direction(options.view_azimuth_deg)
     per_px = np.float32(1 / options.lean)
     above = objects[inside].copy()

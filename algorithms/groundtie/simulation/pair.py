@@ -1,4 +1,4 @@
-"""A SAR image and an optical image of the same simulated place, and the truth between them."""
+"""A SAR and an optical image of the same simulated ground, and the true mapping between them."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ CORNER_M = (412_000.0, 5_334_000.0)
 
 _MARGIN_STEP_PX = 64
 
-# Half a wavelength of the terrain's error, and how many standard deviations it reaches.
+# Half the wavelength of the terrain error, and its largest value in standard deviations.
 _ERROR_CELL_PX = 100
 _ERROR_REACH = 4
 
 
 @dataclass(frozen=True)
 class PairOptions:
-    """Everything that a simulated pair follows from.
+    """All options of a simulated pair.
 
     Attributes
     ----------
@@ -56,10 +56,10 @@ class PairOptions:
     input_pixel_size_m : float or None
         Pixel size of the input; None for that of the scene.
     input : str
-        Which image is the input, one of `INPUTS`; the other one is the reference.
+        The image that is the input, one of `INPUTS`; the other one is the reference.
     terrain_error_m : float
-        Standard deviation of the heights that the input was orthorectified with, against the true
-        ones; correlated over some 100 pixels.
+        Standard deviation of the error of the heights that the input was orthorectified with; the
+        error is correlated over some 100 pixels.
     """
 
     scene: SceneOptions = field(default_factory=SceneOptions)
@@ -71,7 +71,7 @@ class PairOptions:
     terrain_error_m: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.input not in INPUTS:
             raise ParameterError(f"input must be one of {', '.join(INPUTS)}, not {self.input!r}")
         if self.terrain_error_m < 0:
@@ -86,7 +86,7 @@ class PairOptions:
 
     @property
     def sight(self) -> tuple[float, float]:
-        """How far east and north the input shows a place for each metre that it is higher."""
+        """Relief displacement (east, north) in the input, in metres per metre of height."""
         if self.input == SAR:
             return self.sar.towards_radar * self.sar.cot_incidence, 0.0
         east, south = direction(self.optical.view_azimuth_deg)
@@ -105,24 +105,24 @@ class SimulatedPair:
     Attributes
     ----------
     options : PairOptions
-        What it was made from.
+        Options of the simulation.
     reference : uint16 array (bands, rows, columns)
-        SAR amplitude, geocoded, or an optical image, 11 bit.
+        Geocoded SAR amplitude, or an 11-bit optical image.
     reference_grid : Grid
-        Where it lies.
+        Georeferencing of the reference.
     input : uint16 array (bands, rows, columns)
-        The other one of these.
+        The other image.
     truth : Transform
         Reference map position -> input pixel (col, row), exact for points on the ground;
         `truth.input_grid` is the nominal georeferencing of the input.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the input shows.
     roof_points : RoofPoints
-        Points on roofs, which the two images show elsewhere than the ground below them.
+        Points on roofs, which both images show displaced from the ground below.
     scene : Scene
-        The country, with its margin, when the radar took its image.
+        The scene, with its margin, at the radar's acquisition.
     assumed_m : float32 array (rows, columns)
-        Heights, with this margin, that the input was orthorectified with.
+        Heights, with the same margin, that the input was orthorectified with.
     """
 
     options: PairOptions
@@ -142,9 +142,9 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     Raises
     ------
     ParameterError
-        The pixel sizes do not go together.
+        The options are not compatible.
     MemoryLimitError
-        The scene takes more memory than the budget.
+        The scene needs more memory than the budget.
     CancelledError
         The user cancelled the work.
     """
@@ -195,7 +195,7 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
 def _radar_image(
     scene: Scene, options: PairOptions, positions: Positions | None
 ) -> npt.NDArray[np.uint16]:
-    """Return the radar's image, (1, rows, columns): as it is, or as the input shows it."""
+    """Return the radar image, (1, rows, columns); resampled at the positions unless None."""
     if positions is None:
         return render_sar(scene, options.sar)[None]
     power = sar_power(replace(scene, margin_px=0), options.sar)
@@ -211,18 +211,18 @@ def camera_image(
     pixel_ratio: float,
     progress: Progress,
 ) -> npt.NDArray[np.uint16]:
-    """Return the camera's image, (bands, rows, columns).
+    """Return the camera image, (bands, rows, columns).
 
     Parameters
     ----------
     scene
-        When the image was taken.
+        The scene at the camera's acquisition.
     options
-        How the camera looks.
+        Options of the camera.
     positions
-        Where the image's pixels lie; None: on those of the scene without its margin.
+        Positions of the image's pixels in the scene; None: the scene's pixels without the margin.
     pixel_ratio
-        Their size over that of the scene's pixels.
+        Size of the image's pixels over that of the scene's pixels.
     progress
         Receives every band.
     """
@@ -231,7 +231,7 @@ def camera_image(
     image = []
     for band, light in enumerate(radiance):
         progress.update(0.5 + 0.5 * band / len(radiance), "resampling the optical image")
-        # Below 0.6 px the cubic kernel could not follow the scene any more.
+        # Below 0.6 px, the image would be too sharp for cubic interpolation.
         blur(light, max(options.psf_sigma_px * pixel_ratio, 0.6))
         seen = light[rows, columns] if positions is None else resample(light, positions)
         noise = random_stream(scene.seed, Stream.OPTICAL_NOISE, band)
@@ -240,7 +240,7 @@ def camera_image(
 
 
 def _assumed_terrain(scene: Scene, options: PairOptions) -> npt.NDArray[np.float32]:
-    """Return the heights that the input was orthorectified with, on the scene's pixels."""
+    """Return the heights, on the scene's pixels, that the input was orthorectified with."""
     if not options.terrain_error_m:
         return scene.terrain_m
     rows, columns = scene.terrain_m.shape
@@ -256,7 +256,7 @@ def _displaced(
     grid: Grid,
     options: PairOptions,
 ) -> TerrainModel:
-    """Return a misregistration with what an error of the terrain displaces the input by."""
+    """Return a misregistration that includes the displacement by the terrain error."""
     ground, assumed = (Raster(m, grid.transform, grid.crs) for m in (ground_m, assumed_m))
     (left, top), (right, bottom) = grid.pixel_to_map([[0, 0], [grid.width - 1, grid.height - 1]])
     terrain = Terrain.open(ground, assumed, grid.crs, (left, bottom, right, top))
@@ -267,25 +267,25 @@ def _displaced(
 
 
 def _error_reach_px(options: PairOptions) -> int:
-    """Return how far an error of the terrain displaces the input."""
+    """Return the largest displacement of the input by the terrain error."""
     metres = _ERROR_REACH * options.terrain_error_m * math.hypot(*options.sight)
     return math.ceil(metres / options.scene.pixel_size_m)
 
 
 def map_grid(options: SceneOptions) -> Grid:
-    """Return the grid of the SAR image of a scene.
+    """Return the grid of the reference image of a scene.
 
     Raises
     ------
     ParameterError
-        The scene is larger than its map.
+        The scene is larger than the extent of its map projection.
     """
     px_m = options.pixel_size_m
     transform = Affine(px_m, 0, CORNER_M[0], 0, -px_m, CORNER_M[1])
     grid = Grid(transform, CRS.from_epsg(CRS_EPSG), *options.size_px)
     outline = grid.pixel_to_map(grid.outline())
     back = reproject(reproject(outline, grid.crs, LON_LAT), LON_LAT, grid.crs)
-    # Also false where it is not finite.
+    # The comparison is also false for values that are not finite.
     if not (np.abs(back - outline) < px_m).all():
         raise ParameterError(
             f"a scene of {grid.width} × {grid.height} px of {px_m:g} m is larger than its map: "
@@ -295,13 +295,16 @@ def map_grid(options: SceneOptions) -> Grid:
 
 
 def scene_grid(grid: Grid, margin_px: int) -> Grid:
-    """Return the grid of a scene that goes on beyond the grid of its SAR image."""
+    """Return the grid of a scene that extends by a margin beyond its reference image."""
     around = 2 * margin_px
     return grid.window(-margin_px, -margin_px, grid.width + around, grid.height + around)
 
 
 def object_reach_px(scene: SceneOptions, sar: SarOptions, optical: OpticalOptions) -> int:
-    """Return how far from its foot an object or a hill can show up in either image."""
+    """Return the largest distance from its foot at which either image can show an object or hill.
+
+    Cast shadows count, too.
+    """
     object_m = scene.highest_object_m
     cot = sar.cot_incidence
     radar_m = (object_m + scene.relief_m) * cot + object_m / cot
@@ -310,9 +313,9 @@ def object_reach_px(scene: SceneOptions, sar: SarOptions, optical: OpticalOption
 
 
 def in_steps(margin_px: int) -> int:
-    """Return a margin that is at least as wide.
+    """Return a margin rounded up to a coarse step.
 
-    The scene depends on its outer size: in coarse steps, it stays the same when only the
-    distortion or the look changes somewhat.
+    The scene depends on its outer size. With coarse steps it stays the same under small changes of
+    the distortion or the viewing geometry.
     """
     return math.ceil(margin_px / _MARGIN_STEP_PX) * _MARGIN_STEP_PX

@@ -1,4 +1,4 @@
-"""Convex polygons that are cut into smaller ones: districts, blocks, fields and lots."""
+"""Convex polygons and their subdivision into districts, blocks, fields and lots."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def area(polygon: Polygon) -> float:
 
 
 def clip(polygon: Polygon, point: Point, normal: Point) -> Polygon:
-    """Return the part of a convex polygon that lies on the side `normal` points to."""
+    """Return the part of a convex polygon on the side that `normal` points to."""
     kept: Polygon = []
     distances = [(p[0] - point[0]) * normal[0] + (p[1] - point[1]) * normal[1] for p in polygon]
     for i, (here, d) in enumerate(zip(polygon, distances, strict=True)):
@@ -60,7 +60,7 @@ def points_along(polygon: Polygon, per_side: int) -> list[Point]:
 
 
 def moved(place: Point, along: float, across: float, angle_rad: float) -> Point:
-    """Return a place moved along a direction, at an angle to the first axis, and across it."""
+    """Return a point moved along and across the direction at an angle to the first axis."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return place[0] + along * cos - across * sin, place[1] + along * sin + across * cos
 
@@ -72,7 +72,7 @@ def rectangle(centre: Point, half: Point, angle_rad: float) -> Polygon:
 
 
 def main_frame(polygon: Polygon) -> tuple[Point, Point, float]:
-    """Return the centre, the half side lengths and the angle of the box along the longest edge."""
+    """Return the centre, half side lengths and angle of the bounding box along the longest edge."""
     edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
     a, b = max(edges, key=lambda e: (e[1][0] - e[0][0]) ** 2 + (e[1][1] - e[0][1]) ** 2)
     angle = math.atan2(b[1] - a[1], b[0] - a[0])
@@ -85,9 +85,9 @@ def main_frame(polygon: Polygon) -> tuple[Point, Point, float]:
 
 
 def fitted_rectangle(polygon: Polygon, fill: Point) -> Polygon | None:
-    """Return a rectangle along the longest edge that fills these shares of both sides.
+    """Return a rectangle along the longest edge that fills the given shares of the box's sides.
 
-    It is shrunk until it lies inside the polygon; None when the polygon is too pointed for that.
+    It is shrunk until it lies inside the polygon; None if the polygon is too pointed.
     """
     centre, half, angle = main_frame(polygon)
     for shrink in (1.0, 0.94, 0.88, 0.82, 0.7, 0.55):
@@ -100,7 +100,7 @@ def fitted_rectangle(polygon: Polygon, fill: Point) -> Polygon | None:
 def subdivide(
     polygon: Polygon, cell_area: float, lane_width: float, generator: np.random.Generator
 ) -> Subdivision:
-    """Cut a convex polygon across its longer side until cells are about `cell_area` large."""
+    """Cut a convex polygon across its longer side until cells have areas of about `cell_area`."""
     done = Subdivision([], [])
     waiting = [polygon]
     while waiting:
@@ -123,7 +123,7 @@ def subdivide(
 def _split(
     polygon: Polygon, gap: float, share: float, turn: float
 ) -> tuple[Polygon, Polygon, Polygon]:
-    """Both sides of a cut across the longer side, and the lane between them."""
+    """Return the parts on both sides of a cut across the longer side, and the lane between."""
     centre, half, angle = main_frame(polygon)
     longer = 0 if half[0] >= half[1] else 1
     across = angle + longer * math.pi / 2
@@ -139,10 +139,10 @@ def _split(
 
 
 def inset(polygon: Polygon, distance: float) -> Polygon | None:
-    """Move all sides of a convex polygon inwards; None where a side would be lost.
+    """Move all sides of a convex polygon inwards; None if a side would vanish.
 
-    The corners turn from the first axis to the second, as those of `rectangle` do. Corner k of the
-    result belongs to corner k of the polygon.
+    Corners must be ordered from the first axis to the second, as in `rectangle`. Corner k of the
+    result corresponds to corner k of the polygon.
     """
     corners = np.array(polygon)
     along = np.roll(corners, -1, axis=0) - corners

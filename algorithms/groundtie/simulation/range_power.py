@@ -1,6 +1,6 @@
-"""Power over slant range of a side-looking radar: ground, roofs, walls and their corners.
+"""Power over slant range of a side-looking radar: ground, roofs, walls and wall–ground corners.
 
-The radar looks along +columns; each row of the scene is a line of its own. All heights are in
+The radar looks along +columns; each row of the scene is processed independently. All heights are in
 pixels.
 """
 
@@ -15,27 +15,27 @@ from scipy.ndimage import gaussian_filter
 
 from ..rasters.reading import FloatImage
 
-# Points of each pixel's surface; the least height of a wall; the width of the Gaussian that heights
-# are smoothed by for the walls' direction; and how far below a ray is rounding.
+# Sample points per pixel; least height of a wall; width of the Gaussian that smooths heights before
+# wall normals are estimated; and tolerance of visibility tests, which allows for rounding.
 _SAMPLES_PER_PIXEL = 2
 _MIN_WALL_PX = 0.5
 _NORMAL_SIGMA_PX = 1.5
 LEVEL_PX = 0.05
 
-# Power of a square metre of wall that faces the radar, and of a corner at its foot for each pixel
-# of its height, which falls off within some degrees.
+# Power of a square metre of wall that faces the radar, and of the corner at its foot per pixel of
+# wall height. The corner's power falls off within some degrees.
 _WALL_BACKSCATTER = 0.3
 _DOUBLE_BOUNCE_PER_PX = 1.2
 _CORNER_WIDTH_COS = math.cos(math.radians(12))
 
-# Share of a wall's power that comes from the corners of its windows, and where in a storey.
+# Share of a wall's power that comes from window corners, and their relative height in a storey.
 _GLITTER_SHARE = 0.7
 _SILL = 0.3
 
 
 @dataclass(frozen=True)
 class _RangeLine:
-    """Bins of ground-projected slant range: a point at x with height z falls on x − z·cot."""
+    """Bins of ground-projected slant range: a point at x with height z falls into x − z·cot."""
 
     rows: int
     origin: float
@@ -44,7 +44,7 @@ class _RangeLine:
     def splat(
         self, row: npt.NDArray[np.intp], position: npt.NDArray, weight: npt.NDArray
     ) -> npt.NDArray[np.float64]:
-        """Add up weights at positions, shared between the two nearest bins."""
+        """Accumulate weights at positions, each shared between the two nearest bins."""
         offset = position - self.origin
         lower = np.floor(offset)
         share = offset - lower
@@ -87,7 +87,7 @@ def range_power(
 
 
 def _skyline(far_end: FloatImage, cot: float) -> npt.NDArray[np.float64]:
-    """Height over the ray through x = 0 of the highest thing up to the far end of each pixel."""
+    """Return the largest height above the ray through x = 0, up to each pixel's far end."""
     over_ray = far_end + (np.arange(far_end.shape[1]) + 0.5) * cot
     return np.maximum.accumulate(over_ray, axis=1)
 
@@ -100,7 +100,7 @@ def _surface_power(
     skyline: npt.NDArray[np.float64],
     cot: float,
 ) -> npt.NDArray[np.float64]:
-    """Power of ground, canopies and roofs that the radar sees."""
+    """Return the power of the visible ground, canopies and roofs."""
     row = np.broadcast_to(np.arange(top.shape[0])[:, None], top.shape)
     before = np.concatenate([np.full((len(row), 1), -np.inf), skyline[:, :-1]], axis=1)
     total = np.zeros((line.rows, line.bins))
@@ -126,7 +126,7 @@ def _wall_power(
     storey_px: float,
     generator: np.random.Generator,
 ) -> npt.NDArray[np.float64]:
-    """Power of the walls that face the radar and of the corners at their feet."""
+    """Return the power of the walls that face the radar and of the corners at their feet."""
     step = np.diff(objects, axis=1)
     row, left = np.nonzero((step > _MIN_WALL_PX) & building[:, 1:])
     x = left + 0.5
@@ -135,7 +135,7 @@ def _wall_power(
     visible_foot = np.maximum(foot, skyline[row, left] - x * cot)
     visible = np.maximum(head - visible_foot, 0)
     facing = _facing(objects, row, left)
-    # One box of even power over range for each storey, windows and balconies differ.
+    # Each storey has its own power, constant over its range: windows and balconies differ.
     storeys = np.ceil(visible / storey_px).astype(np.intp)
     wall = np.repeat(np.arange(len(row)), storeys)
     storey = np.arange(len(wall)) - np.repeat(np.cumsum(storeys) - storeys, storeys)
@@ -145,12 +145,12 @@ def _wall_power(
     gain = windows[row, left + 1][wall]
     plain = np.where(gain < 0, 1, 1 - _GLITTER_SHARE)
     strength = drawn * facing[wall] ** 2 * _WALL_BACKSCATTER * plain
-    # The running sum of a box's start and end, which lie half a pixel further because a bin
-    # reaches half a pixel to both sides of its position.
+    # The running sum over the edges of these boxes. They lie half a pixel further because a bin
+    # extends half a pixel to both sides of its position.
     edges = x[wall] + 0.5 - np.stack([low + height, low]) * cot
     ends = np.stack([strength / cot, -strength / cot])
     total = np.cumsum(line.splat(np.tile(row[wall], 2), edges.ravel(), ends.ravel()), axis=1)
-    # The windows of a wall are alike, so that their corners make a regular lattice.
+    # The windows of a wall are identical, so that their corners form a regular lattice.
     glitter = (1 + drawn) / 2 * height * np.maximum(gain, 0)
     glitter *= facing[wall] ** 2 * _WALL_BACKSCATTER * _GLITTER_SHARE
     total += line.splat(row[wall], x[wall] - (low + _SILL * height) * cot, glitter)
@@ -164,7 +164,7 @@ def _wall_power(
 def _facing(
     objects: FloatImage, row: npt.NDArray[np.intp], left: npt.NDArray[np.intp]
 ) -> npt.NDArray[np.float32]:
-    """Cosine between the wall's normal and the look direction, from the smoothed heights."""
+    """Return the cosine between wall normals, from smoothed heights, and the look direction."""
     smooth = gaussian_filter(objects, _NORMAL_SIGMA_PX)
     down = np.gradient(smooth, axis=0)[row, left] if objects.shape[0] > 1 else np.zeros(len(row))
     along = smooth[row, left + 1] - smooth[row, left]

@@ -1,9 +1,9 @@
 """A geocoded amplitude image of a side-looking radar.
 
 The radar is far away (parallel rays), flies along the columns and looks along the rows. Power is
-accumulated over slant range, which brings foreshortening, layover, double bounce and shadow by
-itself. The image is then geocoded with the bare terrain, as products are that were corrected with
-a terrain model: ground lies at its place on the map, roofs are displaced towards the sensor by
+accumulated over slant range, which yields foreshortening, layover, double bounce and shadow without
+further modelling. The image is then geocoded with the bare terrain, like terrain-corrected
+products: ground lies at its place on the map, and roofs are displaced towards the sensor by
 height / tan(incidence).
 """
 
@@ -25,7 +25,7 @@ from .scene import Scene
 
 ORBITS = ("ascending", "descending")
 
-# How like real radar images all this is, `benchmarks/run.py --only radar_likeness` measures.
+# `benchmarks/run.py --only radar_likeness` measures how closely this resembles real radar images.
 
 # Standard deviation of the fine texture of each class in dB, in the order of Cover.
 _TEXTURE_DB = np.array([0.3, 0.6, 0.8, 2.0, 0.3, 2.5, 2.5, 2.0, 2.0, 0.3], np.float32)
@@ -40,7 +40,7 @@ NOISE_FLOOR = 10 ** (-25 / 10)
 
 @dataclass(frozen=True)
 class SarOptions:
-    """How the radar looks.
+    """Viewing geometry and radiometry of the radar image.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class SarOptions:
         Incidence angle on level ground.
     orbit : str
         "ascending": flies north and looks east (towards +columns); "descending": flies south and
-        looks west. The radar looks to the right.
+        looks west. The radar is right-looking.
     looks : float
         Equivalent number of looks; infinity for an image without speckle.
     amplitude_at_0_db : float
@@ -61,7 +61,7 @@ class SarOptions:
     amplitude_at_0_db: float = 2000.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if not 10 <= self.incidence_deg <= 70:
             raise ParameterError(f"incidence_deg must be 10 to 70, not {self.incidence_deg}")
         if self.orbit not in ORBITS:
@@ -71,17 +71,17 @@ class SarOptions:
 
     @property
     def cot_incidence(self) -> float:
-        """Ground metres of layover for a metre of height."""
+        """Layover on the ground in metres per metre of height."""
         return 1 / math.tan(math.radians(self.incidence_deg))
 
     @property
     def towards_radar(self) -> int:
-        """The step along columns that leads towards the radar."""
+        """Sign of the column step towards the radar."""
         return -1 if self.orbit == "ascending" else 1
 
     @property
     def azimuth_deg(self) -> float:
-        """Where the radar stands, seen from the ground, clockwise from the top of the image."""
+        """Direction from the ground to the radar, clockwise from the top of the image."""
         return 270.0 if self.orbit == "ascending" else 90.0
 
 
@@ -95,7 +95,7 @@ def render_sar(scene: Scene, options: SarOptions) -> npt.NDArray[np.uint16]:
 
 
 def sar_power(scene: Scene, options: SarOptions) -> FloatImage:
-    """Return the expected power, float32, that `render_sar` would put speckle on."""
+    """Return the expected power, float32, of `render_sar` without speckle."""
     return np.concatenate([power for _, power in _strips(scene, options)])
 
 
@@ -108,7 +108,7 @@ def add_speckle(power: FloatImage, looks: float, generator: np.random.Generator)
 
 
 def quantise_amplitude(power: FloatImage, options: SarOptions) -> npt.NDArray[np.uint16]:
-    """Return amplitudes as grey values from 1; 0 stays free for nodata."""
+    """Return amplitudes as grey values from 1; 0 is reserved for nodata."""
     amplitude = np.sqrt(power) * np.float32(options.amplitude_at_0_db)
     return np.clip(np.rint(amplitude), 1, 65535).astype(np.uint16)
 
@@ -126,9 +126,9 @@ def _strips(scene: Scene, options: SarOptions) -> Iterator[tuple[tuple[int, int,
 def _strip_power(
     scene: Scene, rows: slice, index: int, options: SarOptions, patches: SmoothNoise
 ) -> FloatImage:
-    """Expected power of some full rows of the scene, geocoded."""
+    """Return the expected power of some full rows of the scene, geocoded."""
     texture = random_stream(scene.seed, Stream.SAR_TEXTURE, index)
-    # A look towards -columns is one towards +columns at the mirrored scene.
+    # Looking towards -columns equals looking towards +columns at the mirrored scene.
     mirror = slice(None, None, -1 if options.orbit == "descending" else 1)
     terrain = scene.terrain_m[rows, mirror] / np.float32(scene.pixel_size_m)
     objects = scene.object_m[rows, mirror] / np.float32(scene.pixel_size_m)
@@ -144,7 +144,7 @@ def _strip_power(
 
 
 def _window_gain(scene: Scene, rows: slice) -> FloatImage:
-    """How much stronger than on average windows glitter in each row; −1 for plain walls."""
+    """Return the gain of window corners in each row over their mean; −1 for plain walls."""
     window_m = scene.parcels.window_m[scene.parcel[rows]]
     pitch_px = np.maximum(window_m / np.float32(scene.pixel_size_m), 1)
     hit = np.arange(rows.start, rows.stop)[:, None] % pitch_px < 1
@@ -154,7 +154,7 @@ def _window_gain(scene: Scene, rows: slice) -> FloatImage:
 def _backscatter(
     scene: Scene, rows: slice, patches: SmoothNoise, generator: np.random.Generator
 ) -> FloatImage:
-    """Backscatter coefficient (linear) of level ground, canopies and roofs."""
+    """Return the linear backscatter coefficient of level ground, canopies and roofs."""
     label = scene.parcel[rows]
     cover = scene.parcels.cover[label]
     level_db = scene.parcels.backscatter_db[label]

@@ -1,4 +1,4 @@
-"""A piece of country with terrain, land cover and objects of known height."""
+"""A simulated landscape with terrain, land cover and objects of known height."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .cover import Cover, ParcelBook, ParcelTable
 from .layout import DENSITIES, Layout, highest_object_m
 from .noise import SmoothNoise, Stream, random_stream, strips
 
-# Standard deviation of slopes along an axis for each height on a lattice of width 1, by the mean
-# squares of a cubic B-spline and of its derivative: 151/315 and 2/3.
+# Standard deviation of slopes along an axis over that of heights, on a lattice of spacing 1. It
+# follows from the mean squares of a cubic B-spline and of its derivative: 151/315 and 2/3.
 _SLOPE_OF_SPLINES = math.sqrt((2 / 3) / (151 / 315))
 
-# One place in a thousand is steeper than so many of these standard deviations (Rayleigh), and few
-# are higher than so many of heights above the lowest ones.
+# Slope that one place in a thousand exceeds, in these standard deviations (Rayleigh); and height
+# above the lowest places that few places exceed, in standard deviations of the height.
 _STEEPEST = math.sqrt(2 * math.log(1000))
 _RELIEF_SIGMAS = 4.6
 
@@ -36,7 +36,7 @@ DENSITY_NAMES = (*DENSITIES, CITY)
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What the country looks like.
+    """Properties of the simulated landscape.
 
     Attributes
     ----------
@@ -48,15 +48,15 @@ class SceneOptions:
         "rural" (0–3 % built, 3–8 m high), "suburban" (up to 25 %, 4–12 m), "urban" (about half,
         10–60 m) or "city" (streets, courtyards and towers up to 60 m, cars and railways).
     relief_m : float
-        Height range of the terrain where the scene is larger than its hills.
+        Height range of the terrain in scenes that are larger than their hills.
     seed : int
-        Everything random follows from it.
+        Seed of everything random.
     changed : float
-        Share of the buildings that stand in one of the images only: half of them are pulled down
-        after the radar's image, half are new in the camera's.
+        Share of the buildings that only one image shows: half of them are demolished after the
+        radar's acquisition, half are new in the camera's image.
     slope_deg : float or None
-        Slope that one place in a thousand exceeds, in country that is rough at all scales; None:
-        country is gentle.
+        Slope that one place in a thousand exceeds, in terrain that is rough at all scales; None:
+        gentle terrain.
     """
 
     size_px: tuple[int, int] = (1000, 1000)
@@ -68,7 +68,7 @@ class SceneOptions:
     slope_deg: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if min(self.size_px) < 16:
             raise ParameterError(
                 f"the scene must be at least 16 px wide and high, not {self.size_px}"
@@ -86,7 +86,7 @@ class SceneOptions:
 
     @property
     def highest_object_m(self) -> float:
-        """The greatest height that a building or a canopy can have."""
+        """Greatest possible height of a building or a canopy."""
         return HIGHEST_M if self.density == CITY else highest_object_m(self.density)
 
 
@@ -101,7 +101,7 @@ class Scene:
     margin_px : int
         Rows and columns on each side that are not part of the reference image.
     seed : int
-        Seed of the textures that the sensors see.
+        Seed of the textures in the images.
     terrain_m : float32 array (rows, columns)
         Height of the bare ground.
     object_m : float32 array (rows, columns)
@@ -129,7 +129,7 @@ class Scene:
 
     @property
     def surface_m(self) -> npt.NDArray[np.float32]:
-        """What a surface model states: heights of ground, roofs and canopies, without vehicles."""
+        """Digital surface model: heights of ground, roofs and canopies, without vehicles."""
         stands = self.cover() != Cover.CAR
         return np.asarray(self.terrain_m + np.where(stands, self.object_m, np.float32(0)))
 
@@ -138,14 +138,14 @@ class Scene:
         return self.parcels.cover[self.parcel[rows]]
 
     def patches(self, stream: Stream, size_m: float) -> SmoothNoise:
-        """Return how parcels vary within themselves: a field that is smooth over some metres."""
+        """Return a random field, smooth over some metres, for the variation within parcels."""
         shape = (self.parcel.shape[0], self.parcel.shape[1])
         cell_px = max(size_m / self.pixel_size_m, 3.0)
         return SmoothNoise.draw(shape, cell_px, random_stream(self.seed, stream))
 
 
 class Scenes(NamedTuple):
-    """A scene when the radar and when the camera took its image."""
+    """A scene as it is at the radar's and at the camera's acquisition."""
 
     radar: Scene
     camera: Scene
@@ -162,14 +162,14 @@ def generate_scenes(options: SceneOptions, margin_px: int = 0) -> Scenes:
     Parameters
     ----------
     options : SceneOptions
-        What the country looks like.
+        Properties of the landscape.
     margin_px : int
-        How far the country goes on beyond the wanted size.
+        Margin of the scene beyond the requested size.
 
     Returns
     -------
     Scenes
-        One and the same if nothing has changed.
+        Both are the same object if nothing has changed.
     """
     width, height = (size + 2 * margin_px for size in options.size_px)
     shape = (height, width)
@@ -188,7 +188,7 @@ def generate_scenes(options: SceneOptions, margin_px: int = 0) -> Scenes:
 
 
 def _layout(options: SceneOptions, shape: tuple[int, int], book: ParcelBook) -> Layout | CityLayout:
-    # Fields and houses of coarse images grow with the pixel, or they would be smaller than one.
+    # In coarse images, fields and houses grow with the pixel, or they would be smaller than one.
     enlargement = max(options.pixel_size_m / _COARSEST_FULL_SIZE_M, 1.0)
     scale = enlargement / options.pixel_size_m
     generator = random_stream(options.seed, Stream.LAYOUT)
@@ -204,7 +204,7 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
     if options.relief_m == 0:
         return terrain
     if options.slope_deg is not None:
-        # Above the sea: whoever reads heights takes those below all land for voids.
+        # Keep the terrain above the sea: heights below all land are read as voids.
         terrain += options.relief_m
     for octave, (cell_m, sigma_m) in enumerate(_octaves(options)):
         cell_px = max(cell_m / options.pixel_size_m, _LEAST_CELL_PX)
@@ -217,14 +217,14 @@ def _terrain(options: SceneOptions, shape: tuple[int, int]) -> npt.NDArray[np.fl
 
 
 def _octaves(options: SceneOptions) -> list[tuple[float, float]]:
-    """Return the terrain's waves: spacing of a lattice and standard deviation of heights, metres.
+    """Return each octave's lattice spacing and standard deviation of heights, in metres.
 
-    Country is gentle unless slopes are asked for. Mountains are rough at all scales alike: each
-    octave down to some pixels has the same slopes.
+    Terrain is gentle unless a slope is given. Mountains are equally rough at all scales: every
+    octave, down to some pixels, has the same slopes.
     """
     relief_m = options.relief_m
     if options.slope_deg is None:
-        # A lattice as wide as six times the relief keeps slopes below some 12 degrees.
+        # A lattice spacing of six times the relief keeps slopes below some 12 degrees.
         hill_m = max(300.0, 6 * relief_m)
         shares = ((1.0, 0.9), (0.35, 0.2), (0.12, 0.04))
         return [(hill_m * size, share * relief_m / 4) for size, share in shares]
@@ -232,7 +232,7 @@ def _octaves(options: SceneOptions) -> list[tuple[float, float]]:
     steep = math.tan(math.radians(options.slope_deg)) / _STEEPEST
     least_m = _LEAST_CELL_PX * options.pixel_size_m
     count = 1
-    # More octaves share the slopes, so that the widest is wider.
+    # With more octaves, each has a smaller share of the slopes, and the widest becomes wider.
     while _widest_m(sigma_m, steep, count) / 2 ** (count - 1) > 2 * least_m:
         count += 1
     widest_m = _widest_m(sigma_m, steep, count)
@@ -240,14 +240,14 @@ def _octaves(options: SceneOptions) -> list[tuple[float, float]]:
 
 
 def _widest_m(sigma_m: float, steep: float, octaves: int) -> float:
-    """Return the spacing at which as many octaves have a standard deviation of slopes `steep`."""
+    """Return the widest spacing at which the slopes of all octaves have deviation `steep`."""
     return _SLOPE_OF_SPLINES * sigma_m * math.sqrt(octaves) / steep
 
 
 def _object_heights(
     options: SceneOptions, parcel: npt.NDArray[np.int32], parcels: ParcelTable
 ) -> npt.NDArray[np.float32]:
-    """Roofs are flat; canopies are made of crowns."""
+    """Return object heights: roofs are flat, canopies consist of crowns."""
     heights = np.empty(parcel.shape, np.float32)
     cell_px = max(_CROWN_M / options.pixel_size_m, 1.0)
     crowns = SmoothNoise.draw(

@@ -1,4 +1,4 @@
-"""A simulated sensor image as files."""
+"""Output files of a simulated sensor image."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ROOF_POINT_COLUMNS = (
 
 
 def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]:
-    """Write a sensor image into a folder, which is made if need be; all files appear or none.
+    """Write a sensor image into a folder, which is created if needed; all files appear or none.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
 
 
 def truth_json(made: SensorImage) -> dict[str, Any]:
-    """Return what is true of a sensor image, and all that it was drawn from.
+    """Return the truth of a sensor image and the options that it was drawn from.
 
     `true_to_delivered` and `delivered_to_true` are the 2×3 matrices between the image positions
     (col, row, 1) of the camera and those of the delivered RPCs.

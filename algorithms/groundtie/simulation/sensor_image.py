@@ -1,4 +1,4 @@
-"""An optical image in the geometry of its sensor, with RPCs, and a SAR image of the same ground."""
+"""An optical image in sensor geometry, with RPCs, and a SAR image of the same ground."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .pair import camera_image, in_steps, map_grid, object_reach_px, scene_grid
 from .sar import SarOptions, render_sar
 from .scene import SceneOptions, generate_scenes
 
-# Height above the ellipsoid that the scene's terrain counts from.
+# Ellipsoidal height of the scene's height 0.
 GROUND_M = 450.0
 
-# Heights that RPCs hold for, beyond those of the terrain.
+# Height range in which RPCs are valid, beyond that of the terrain.
 _RPC_REACH_M = 200.0
 
 _PRECISION_M = 1e-5
@@ -37,16 +37,16 @@ _STEPS = 100
 
 @dataclass(frozen=True)
 class SensorOptions:
-    """Everything that a simulated sensor image follows from.
+    """All options of a simulated sensor image.
 
     Attributes
     ----------
     scene, sar, optical, attitude
-        Options of the parts; the camera stands where `optical` places it.
+        Options of the parts; `optical` gives the viewing direction of the camera.
     heading_deg : float
-        Where the satellite flies to, clockwise from north.
+        Flight direction of the satellite, clockwise from north.
     altitude_m : float
-        Its height above the ground.
+        Height of the satellite above the ground.
     """
 
     scene: SceneOptions = field(default_factory=SceneOptions)
@@ -57,13 +57,13 @@ class SensorOptions:
     altitude_m: float = 681_000.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse options that cannot be simulated."""
         if self.optical.off_nadir_deg > 45:
             raise ParameterError("the camera must look down by 45° or more steeply")
 
     @property
     def hills_m(self) -> float:
-        """How far hills rise and fall: up to a half beyond the range over most of the scene."""
+        """Largest rise or fall of the terrain: one and a half times its usual range."""
         return 1.5 * self.scene.relief_m
 
 
@@ -74,26 +74,26 @@ class SensorImage:
     Attributes
     ----------
     options : SensorOptions
-        What it was made from.
+        Options of the simulation.
     reference : uint16 array (rows, columns)
-        SAR amplitude, geocoded.
+        Geocoded SAR amplitude.
     reference_grid : Grid
-        Where it lies.
+        Georeferencing of the reference.
     image : uint16 array (bands, rows, columns)
-        Optical image, 11 bit, in the geometry of its sensor.
+        11-bit optical image in sensor geometry.
     camera : PushBroom
-        That geometry.
+        The true sensor geometry.
     error : AttitudeError
-        What is wrong with the delivered RPCs.
+        Error of the delivered RPCs.
     exact, delivered : RPCFit
-        RPCs of the camera, and those with the error.
+        RPCs of the camera, without and with the error.
     terrain_m : float32 array (rows, columns)
-        Height of the bare ground above the ellipsoid, beyond all that the image shows, in
-        truth or nominally.
+        Height of the bare ground above the ellipsoid. It covers all ground that the image shows,
+        by its true and by its delivered geometry.
     surface_m : float32 array (rows, columns)
         The same with buildings and trees.
     terrain_grid : Grid
-        Where both lie.
+        Georeferencing of both height models.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the image shows.
     roof_points : RoofPoints
@@ -137,7 +137,7 @@ class Terrain:
         return np.column_stack([xy, self.at(xy)])
 
     def seen_by(self, camera: PushBroom, px: FloatArray) -> FloatArray:
-        """Return the map positions of the ground that image positions see, both (n, 2)."""
+        """Return the map positions of the ground at image positions, both (n, 2)."""
         height_m = np.full(len(px), GROUND_M)
         for _ in range(_STEPS):
             xy = camera.localise(px, height_m)
@@ -155,9 +155,9 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     Raises
     ------
     ParameterError
-        The options do not go together.
+        The options are not compatible.
     MemoryLimitError
-        The scene takes more memory than the budget.
+        The scene needs more memory than the budget.
     CancelledError
         The user cancelled the work.
     """
@@ -199,7 +199,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
 
 
 def _camera(options: SensorOptions, grid: Grid) -> PushBroom:
-    """Return the camera that looks at the middle of the scene."""
+    """Return the camera that is aimed at the centre of the scene."""
     x, y = grid.pixel_to_map([grid.centre_px])[0].tolist()
     return PushBroom.aimed(
         (x, y, GROUND_M),
@@ -213,9 +213,9 @@ def _camera(options: SensorOptions, grid: Grid) -> PushBroom:
 
 
 def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: AttitudeError) -> int:
-    """Return how far the scene goes on beyond the SAR image.
+    """Return the margin of the scene beyond the SAR image.
 
-    All that the image shows, in truth and by its RPCs, has heights and objects.
+    The scene covers all ground that the image shows, by its true geometry and by its RPCs.
     """
     outline = Grid(PIXEL_COORDINATES, None, *options.scene.size_px).outline()
     seen = [
@@ -230,7 +230,7 @@ def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: Att
 
 
 def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> Positions:
-    """Return where the scene's pixels are that the image's pixels see."""
+    """Return the positions in the scene of the ground that the image's pixels show."""
     places = np.empty((2, size[1], size[0]))
     for _, start, stop in strips(size[1]):
         px = mesh(np.arange(size[0]), np.arange(start, stop)).astype(float)
@@ -242,7 +242,7 @@ def _seen(camera: PushBroom, terrain: Terrain, size: tuple[int, int]) -> Positio
 def _rpcs(
     options: SensorOptions, camera: PushBroom, error: AttitudeError, grid: Grid
 ) -> tuple[RPCFit, RPCFit]:
-    """Return the RPCs of the camera, and those with the error, over the image's own range."""
+    """Return the RPCs of the camera, without and with the error, over the image's own range."""
     reach_m = options.hills_m + _RPC_REACH_M
     heights_m = np.linspace(GROUND_M - reach_m, GROUND_M + reach_m, HEIGHTS)
     nominal, heights = image_places(options.scene.size_px, heights_m)
@@ -256,5 +256,5 @@ def _rpcs(
             )
         return fit_rpc(lon_lat, heights, nominal)
 
-    # The error moves what is seen: RPCs with it see their image's pixels elsewhere.
+    # RPCs with the error assign other ground positions to the same image pixels.
     return fitted(nominal), fitted(error.inverse()(nominal))

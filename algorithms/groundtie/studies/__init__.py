@@ -1,1 +1,1 @@
-"""What compares methods: optimisers, detectors, measures. The registering tools use none of it."""
+"""Comparisons of methods: optimisers, detectors, measures. No registering tool uses them."""

@@ -1,8 +1,8 @@
-"""The determinant of the Hessian by box filters, from the integral image ([Bay2008]).
+"""The determinant of the Hessian by box filters on the integral image ([Bay2008]).
 
-Second derivatives of a Gaussian are taken for a few boxes; a box of any size costs four values of
-the integral image. Differences along columns are shared by all boxes of a filter, and everything is
-done on strips of rows that stay in the processor's cache.
+Second derivatives of a Gaussian are approximated by a few boxes; a box of any size costs four
+values of the integral image. Boxes of a filter share sums over rows, and the work is done on strips
+of rows that stay in the processor's cache.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from ..rasters.reading import FloatImage
 
 IntegralImage = NDArray[np.float64]
 
-# Standard deviation of the Gaussian that a filter of so many pixels a side stands for.
+# Side of the smallest filter, and standard deviation of the Gaussian that it approximates.
 FIRST_SIDE_PX, FIRST_SIGMA_PX = 9, 1.2
 
-# The mixed derivative is larger than that of the Gaussian by this ([Bay2008], eq 3).
+# Correction of the mixed derivative, which boxes overestimate ([Bay2008], eq 3).
 _MIXED_WEIGHT = np.float32(0.9)
 
-# Pixels of a strip: a few arrays of them fit into the second cache.
+# Pixels of a strip: a few arrays of this size fit into the second-level cache.
 _STRIP_PX = 64_000
 
 
 def integral_image(image: FloatImage) -> IntegralImage:
     """Return the sums of all pixels above and left of each position, shape (h + 1, w + 1).
 
-    The mean is taken out first, so that sums stay small.
+    The mean is subtracted first, so that sums stay small.
     """
     centred = image - np.float32(image.mean())
     return np.asarray(cv2.integral(centred, sdepth=cv2.CV_64F))
 
 
 def sigma_of(side_px: Any) -> Any:
-    """Return the standard deviation of the Gaussian that a filter stands for, in pixels."""
+    """Return the standard deviation of the Gaussian that a filter approximates, in pixels."""
     return side_px * FIRST_SIGMA_PX / FIRST_SIDE_PX
 
 
@@ -58,14 +58,14 @@ def determinants(
     sides_px
         Sides of the filters: odd multiples of 3.
     step
-        Determinants are computed at every so many columns and rows, from the first.
+        Spacing of the computed columns and rows, starting at the first.
     context
-        Threads to work in; None: this one.
+        Provides threads; None: the current one only.
 
     Returns
     -------
-    One image a filter, shape (⌈h / step⌉, ⌈w / step⌉), grey values squared over pixels⁴ times the
-    filter's scale⁴, up to a constant; 0 where the filter sees beyond the image.
+    One image per filter, shape (⌈h / step⌉, ⌈w / step⌉), in grey values squared over pixels⁴ times
+    the filter's scale⁴, up to a constant; 0 where the filter extends beyond the image.
     """
     height, width = (size - 1 for size in integral.shape)
     shape = -(-height // step), -(-width // step)
@@ -88,7 +88,7 @@ def _call(task: partial[None]) -> None:
 
 
 def _fill(integral: IntegralImage, side: int, step: int, strip: slice, out: FloatImage) -> None:
-    """Compute the rows `strip` of `out`, but for the columns where the filter sees beyond."""
+    """Compute the rows `strip` of `out`, except columns where the filter leaves the image."""
     lobe, half = side // 3, side // 2
     middle = lobe // 2
     width = integral.shape[1] - 1
@@ -101,8 +101,8 @@ def _fill(integral: IntegralImage, side: int, step: int, strip: slice, out: Floa
         return integral[strip.start * step + offset : (strip.stop - 1) * step + offset + 1 : step]
 
     def rows(top: int, bottom: int) -> FloatImage:
-        """Return sums over rows from `top` to `bottom`, which both count, and all columns left."""
-        # In double precision up to here; what is left is small enough for single.
+        """Return sums over rows `top` to `bottom`, inclusive, and all columns to the left."""
+        # The sums up to here need double precision; their differences fit into single.
         return np.subtract(row(bottom + 1), row(top)).astype(np.float32)
 
     def cols(sums: FloatImage, left: int, right: int) -> FloatImage:

@@ -1,4 +1,4 @@
-"""Searches for a pose that climb the similarity from several starts."""
+"""Pose searches that climb the similarity from several starting points."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from ..similarity.order_statistics import robust_deviation
 from ..similarity.surface import SimilaritySettings
 from .objective import BinnedPair, bin_pair
 
-# A point of the space that is searched; see `PoseSpace`.
+# A point of the search space; see `PoseSpace`.
 Place = tuple[float, ...]
 Similarity = Callable[[Place], float]
 Climb = Callable[[Similarity, "PoseSpace", Place, np.random.Generator], Place]
 
-# About as wide is a peak of the similarity, in pixels; so exact a place is wanted.
+# Approximate width of a similarity peak, and the required precision of a place, in pixels.
 PEAK_PX = 4.0
 PRECISION_PX = 0.05
 
-# So many candidates are returned at most.
+# Largest number of candidates that are returned.
 _CANDIDATES = 4
 
-# Ends of climbs that are the same place, in pixels; on aligned grids they are exact.
+# Climbs that end within this distance, in pixels, agree; on aligned grids, ends must be equal.
 _SAME_END_PX = 1.0
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard a search that climbs tries.
+    """Effort of a climbing search.
 
     Parameters
     ----------
     restarts
-        How often it may start again, at places drawn evenly from within the limits.
+        Largest number of restarts, at places drawn uniformly within the limits.
     agreeing
-        After so many climbs have ended at the best place, there are no more.
+        The search stops when this many climbs have ended at the best place.
     """
 
     restarts: int = 31
@@ -54,18 +54,18 @@ class Effort:
 class PoseSpace:
     """Poses within limits as places (right, down[, rotation][, scale]), all in pixels.
 
-    One pixel of rotation or of (logarithmic) scale moves the template's pixels by one pixel, in
-    the root mean square, so that steps are alike in all directions.
+    One pixel of rotation or of (logarithmic) scale moves the template's pixels by one pixel in
+    the root mean square, so that equal steps have equal effects in all dimensions.
 
     Parameters
     ----------
     limits
-        What is searched; what may not vary is no dimension, but for the shift.
+        Limits of the search. A fixed rotation or scale is not a dimension; the shift always is.
     spread_px
         Root mean square distance of the template's pixels from its centre.
     origin
-        A shift at which the pixel grids meet: only those whole pixels from it are places. None:
-        all shifts are.
+        A shift that aligns the pixel grids; places then have shifts at whole pixels from it. None:
+        places may have any shift.
     """
 
     limits: SearchLimits
@@ -96,7 +96,7 @@ class PoseSpace:
         return self.limits.scale[0] < self.limits.scale[1]
 
     def settle(self, values: ArrayLike) -> Place:
-        """Return the place nearest to some values, shape (dimensions,)."""
+        """Return the place nearest to the given values, shape (dimensions,)."""
         place = np.array(values, float)
         if self.origin is not None:
             origin = np.array(self.origin)
@@ -105,7 +105,7 @@ class PoseSpace:
         return tuple(map(float, np.clip(place, low, high)))
 
     def draw(self, rng: np.random.Generator) -> Place:
-        """Return a place drawn evenly."""
+        """Return a place drawn uniformly."""
         return self.settle(rng.uniform(*self.bounds.T))
 
     def pose(self, place: Place) -> Pose:
@@ -135,24 +135,24 @@ def spread_px(shape: tuple[int, ...]) -> float:
 def climb_often(
     similarity: Similarity, space: PoseSpace, climb: Climb, effort: Effort, seed: int
 ) -> tuple[list[Place], list[float]]:
-    """Climb from the nominal pose and from drawn ones, until enough end at the best place.
+    """Climb from the nominal pose and from drawn ones, until enough climbs end at the best place.
 
     Parameters
     ----------
     similarity
-        What is climbed.
+        The function to climb.
     space
-        Where.
+        The search space.
     climb
         Returns the best place it found from a start.
     effort
-        How often to start.
+        Limits on the number of climbs.
     seed
-        Of everything that is drawn.
+        Seed of all random numbers.
 
     Returns
     -------
-    Where climbs ended, in their order, and the similarity at all starts they might have had.
+    The ends of the climbs in order, and the similarity at all drawn starts, used or not.
     """
     rng = np.random.default_rng(seed)
     same_px = _SAME_END_PX if space.origin is None else 0.0
@@ -172,8 +172,9 @@ def search_by_climbing(
 ) -> list[PoseFound]:
     """Return the best distinct places that climbs end at, best first.
 
-    Heights are in robust standard deviations of the similarity at the drawn starts. Evaluations
-    are those of the whole search, starts included: before its end, no candidate is known as such.
+    Heights are in robust standard deviations of the similarity at the drawn starts. Every candidate
+    carries the number of evaluations of the whole search, drawn starts included, because no
+    candidate is known before its end.
     """
 
     @cache
@@ -199,18 +200,17 @@ def search_by_climbing(
 
 @dataclass(frozen=True)
 class ClimbingSearch:
-    """A `PoseSearch` that climbs from several starts, which the context's seed draws.
+    """A `PoseSearch` that climbs from several starts, drawn by the context's seed.
 
     Parameters
     ----------
     climb
         Returns the best place it found from a start.
     effort
-        How often to start.
+        Limits on the number of climbs.
     on_grid
-        Whether only shifts of whole pixels between the windows' pixels are searched for. Where
-        their sizes are even in one and odd in the other, the shift of their centres ends in a
-        half.
+        Whether to search only shifts that align the windows' pixel grids. If one size is even and
+        the other odd, such shifts between the window centres end in one half.
     """
 
     climb: Climb
@@ -225,13 +225,13 @@ class ClimbingSearch:
         settings: SimilaritySettings,
         context: Context,
     ) -> list[PoseFound]:
-        """Search within limits; every evaluation depends on those before, in one thread.
+        """Search within limits, in one thread, as every evaluation depends on earlier ones.
 
         Raises
         ------
         ParameterError
-            The similarity is not one of joint histograms; or rotation or scale are searched for
-            on aligned grids.
+            The similarity is not measured on joint histograms; or the search on aligned grids
+            includes rotation or scale.
         """
         if self.on_grid and not limits.is_shift:
             raise ParameterError("discrete SPSA searches for shifts alone")

@@ -1,9 +1,9 @@
 """Mutual information by maximum likelihood of a density ratio (MLMI; [Patel2017] 3.2.1).
 
-The ratio w(x, y) = p(x, y) / (p(x) p(y)) is modelled as it is, without densities: as a sum of
-Gaussian kernels with weights that are not negative. They maximise the likelihood Σ log w(x, y) of
-the pairs seen, with the mean of w over all x and y combined freely held at 1. Mutual information
-is the mean of log w [Suzuki2008].
+The ratio w(x, y) = p(x, y) / (p(x) p(y)) is modelled directly, without estimating densities, as a
+sum of Gaussian kernels with non-negative weights. The weights maximise the likelihood Σ log w(x, y)
+of the observed pairs, under the constraint that the mean of w over all combinations of x and y is
+1. Mutual information is the mean of log w [Suzuki2008].
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from ..similarity.binning import to_bins
 from ..similarity.joint_histogram import count_joint_histograms
 from .measures import mutual_information
 
-# Kernel widths to choose from, in standard deviations of the grey values' normal scores.
+# Candidate kernel widths, in standard deviations of the grey values' normal scores.
 WIDTHS = (0.15, 0.22, 0.32, 0.47, 0.68, 1.0, 1.5)
 _FOLDS = 3
 
-# How near the likelihood of a fit is to its maximum, in nats a pixel; to compare widths or shifts,
-# less will do.
+# Largest shortfall of a fit's likelihood from its maximum, in nats per pixel. The rough limit is
+# enough to compare widths or shifts.
 TOLERANCE, _ROUGH = 1e-5, 1e-3
-# Of surfaces: kernels at every shift, and bins of the histograms that choose the likeliest shift.
+# For surfaces: kernels at every shift, and bins of the histograms that choose the likeliest shift.
 _SURFACE_KERNELS, _ROUGH_BINS = 100, 16
 _FIRST_STEPS, _LAST_STEPS = 30, 60
 
-# Added to the Hessian, whose diagonal is about 1: kernels that overlap make it singular.
+# Added to the Hessian, whose diagonal is about 1, because overlapping kernels make it singular.
 _RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
 class DensityRatio:
-    """A fitted ratio of densities.
+    """A fitted density ratio.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class DensityRatio:
     width
         Standard deviation of the kernels.
     weights
-        Weights of the kernels, shape (b,), none of them negative.
+        Non-negative weights of the kernels, shape (b,).
     """
 
     centres: FloatArray
@@ -70,7 +70,7 @@ def fit_density_ratio(
     width: float,
     tolerance: float = TOLERANCE,
 ) -> DensityRatio:
-    """Fit the ratio of densities to pairs of values.
+    """Fit the density ratio to pairs of values.
 
     Parameters
     ----------
@@ -81,19 +81,19 @@ def fit_density_ratio(
     width
         Standard deviation of the kernels.
     tolerance
-        By how much the mean of log w may fall short of its maximum.
+        Largest shortfall of the mean of log w from its maximum.
     """
     along_x, along_y = _kernels(np.asarray(x), np.asarray(y), centres, width)
-    # The mean of a kernel over all combinations of x and y is a product, too.
+    # A kernel is separable, and so is its mean over all combinations of x and y.
     means = along_x.mean(axis=0) * along_y.mean(axis=0)
     shares = _most_likely(along_x * along_y / means, tolerance)
     return DensityRatio(centres, width, shares / means)
 
 
 def choose_width(x: FloatArray, y: FloatArray, centres: FloatArray, seed: int = 0) -> float:
-    """Return the width of `WIDTHS` under which pairs that took no part in a fit are likeliest.
+    """Return the width of `WIDTHS` that maximises the likelihood of held-out pairs.
 
-    Too few pairs to hold some out take the widest, which assumes the least.
+    With too few pairs for cross-validation, the widest is taken because it assumes the least.
     """
     if x.size < 2 * _FOLDS:
         return WIDTHS[-1]
@@ -110,8 +110,8 @@ def choose_width(x: FloatArray, y: FloatArray, centres: FloatArray, seed: int = 
 def normal_scores(values: ArrayLike) -> FloatArray:
     """Return the normal quantiles of the values' ranks, shape (n,).
 
-    Mutual information does not change under monotone functions of either image; with normal scores
-    one kernel width fits optical images as well as the long tails of radar images.
+    Mutual information is invariant to monotone functions of either image. On normal scores, one
+    kernel width suits both optical images and the long-tailed values of radar images.
     """
     values = np.asarray(values)
     return np.asarray(norm.ppf((rankdata(values) - 0.5) / max(values.size, 1)))
@@ -133,16 +133,16 @@ def maximum_likelihood_mutual_information(
     a, b
         Grey values of the pixels of two images, shape (n,).
     width
-        Standard deviation of the kernels in those of the normal scores; None: chosen by
-        cross-validation.
+        Standard deviation of the kernels, in standard deviations of the normal scores; None:
+        chosen by cross-validation.
     sample
-        Most pairs that are used; they are drawn from all.
+        Largest number of pairs; they are drawn from all pairs.
     kernels
-        Most kernels that are used.
+        Largest number of kernels.
     seed
-        Of the sample and of the cross-validation.
+        Seed of the sample and of the cross-validation.
     tolerance
-        By how much the result may fall short of the most likely one.
+        Largest shortfall of the result from the most likely one.
     """
     a, b = np.asarray(a).ravel(), np.asarray(b).ravel()
     if a.size < 2:
@@ -159,21 +159,21 @@ def maximum_likelihood_mutual_information(
 def information_surface(
     template: Patch, search: Patch, sample: int, context: Context
 ) -> NDArray[np.float32]:
-    """Return the mutual information of a sample of a template's pixels over all whole shifts.
+    """Return the mutual information of a sample of template pixels at all whole-pixel shifts.
 
-    The width of the kernels is chosen once, at the shift of the most informative
-    histogram, and is then the same for all.
+    The kernel width is chosen once, at the shift with the most informative histogram, and used
+    at all shifts.
 
     Parameters
     ----------
     template
         Shape (h, w).
     search
-        A window with the same centre, larger by the radius on each side.
+        A concentric window, larger by the radius on each side.
     sample
-        Most pixels that are used; they are the same at all shifts.
+        Largest number of pixels; the same pixels are used at all shifts.
     context
-        Threads to work in; its progress receives every row, its seed is that of the sample and of
+        Provides threads; its progress receives every row, and its seed is used for the sample and
         the cross-validation.
 
     Returns
@@ -206,7 +206,7 @@ def information_surface(
 
 
 def _most_informative_shift(template: Patch, search: Patch) -> tuple[int, int]:
-    """Return the shift (rows, columns), from 0, of the highest mutual information of histograms."""
+    """Return the shift (rows, columns), from 0, of the highest histogram mutual information."""
     first, second = (to_bins(p.values, p.valid, _ROUGH_BINS) for p in (template, search))
     information = mutual_information(count_joint_histograms(first, second, (_ROUGH_BINS,) * 2))
     dy, dx = np.unravel_index(information.argmax(), information.shape)
@@ -225,17 +225,17 @@ def _kernels(
 
 
 def _log(ratio: FloatArray) -> FloatArray:
-    """Return logarithms, those of ratios that were rounded to 0 as of the smallest number."""
+    """Return logarithms; ratios that were rounded to 0 count as the smallest positive number."""
     return np.asarray(np.log(np.maximum(ratio, np.finfo(float).tiny)))
 
 
 def _most_likely(kernels: FloatArray, tolerance: float) -> FloatArray:
-    """Return shares ≥ 0 of kernels of mean 1, shape (n, b), that maximise Σ log(kernels · shares).
+    """Return the shares ≥ 0, with sum 1, that maximise Σ log(kernels · shares).
 
-    Their sum is 1. Steps of expectation and maximisation start, from equal shares; Newton's steps
-    within the constraint, each a problem of least squares, finish. The problem is convex. No
-    kernel's gradient may exceed 1 at the maximum, and by what it does the likelihood falls short of
-    it at most.
+    The kernels, shape (n, b), have mean 1. Expectation–maximisation steps start from equal shares.
+    Constrained Newton steps finish; each is a least-squares problem. The problem is convex. At the
+    maximum no kernel's gradient exceeds 1, and the excess of the largest gradient bounds the
+    shortfall of the likelihood.
     """
     kernels = np.maximum(kernels, np.finfo(float).tiny ** 0.5)
     shares = np.full(kernels.shape[1], 1 / kernels.shape[1])
@@ -254,12 +254,12 @@ def _gradient(kernels: FloatArray, shares: FloatArray) -> FloatArray:
 
 
 def _loss(kernels: FloatArray, shares: FloatArray) -> float:
-    """Return a function whose minimum over shares ≥ 0 has a sum of 1 by itself."""
+    """Return a loss whose minimum over shares ≥ 0 has a sum of 1 without a constraint."""
     return float(shares.sum() - np.log(kernels @ shares).mean())
 
 
 def _newton_step(kernels: FloatArray, shares: FloatArray, gradient: FloatArray) -> FloatArray:
-    """Return the minimum of the loss' parabola at `shares`, or a point on the way that is lower."""
+    """Return the minimum of the quadratic model of the loss, or a lower point on the way there."""
     relative = kernels / (kernels @ shares)[:, None]
     hessian = relative.T @ relative / len(kernels)
     hessian[np.diag_indices_from(hessian)] += _RIDGE * hessian.trace() / len(hessian)

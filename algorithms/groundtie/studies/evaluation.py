@@ -1,4 +1,4 @@
-"""How features of two registered images repeat and match ([Suri2010] 6.6.2)."""
+"""Repeatability and matching of the features of two registered images ([Suri2010] 6.6.2)."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from .sift_variants import DETECTORS, SiftVariantDescriptor, sift_detector
 
 _TURNING = "oriented"
 
-# Matches are fitted by this.
+# The model that is fitted to matches.
 _MODEL = "affine"
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A detector and a descriptor, and what they are called together."""
+    """A combination of a detector and a descriptor, with its name."""
 
     name: str
     detector: Detecting
@@ -39,19 +39,19 @@ class Variant:
 
     @classmethod
     def parse(cls, name: str, contrast: float | None = None) -> Variant:
-        """Return the variant of a name: words of detector and gradient, "oriented", joined by +.
+        """Return the variant of a name: detector, gradient and "oriented", joined by +.
 
         Parameters
         ----------
         name
             For example "sift-oct" or "sift-oct+roewa+oriented".
         contrast
-            Least contrast of features; None: as fits the detector.
+            Least contrast of features; None: the detector's default.
 
         Raises
         ------
         ParameterError
-            No detector or more than one word of a kind is named.
+            The name has no detector, an unknown word, or more than one word of a kind.
         """
         words = name.split("+")
         detectors = [word for word in words if word in DETECTORS]
@@ -70,14 +70,14 @@ class Variant:
 
 @dataclass(frozen=True)
 class Consistency:
-    """How well matches agree on an affine model.
+    """Agreement of matches with an affine model.
 
     Parameters
     ----------
     matches
-        Their number.
+        Number of matches.
     std_px
-        Standard deviation of their residuals along columns and rows; NaN for too few matches.
+        Standard deviation of the residuals along columns and rows; NaN for too few matches.
     by_class
         Matches in each class of overlap error (see `repeatability.CLASS_NAMES`), shape (5,).
     """
@@ -88,7 +88,7 @@ class Consistency:
 
     @classmethod
     def of(cls, first: Keypoints, second: Keypoints) -> Consistency:
-        """Return the consistency of features that match, row by row."""
+        """Return the consistency of features that are matched row by row."""
         px, partner_px = first.position_px, second.position_px
         std = np.full(2, np.nan)
         if len(first) > PARAMETERS[_MODEL] // 2:
@@ -98,7 +98,7 @@ class Consistency:
         return cls(len(first), (float(std[0]), float(std[1])), by_class)
 
     def summary(self) -> dict[str, Any]:
-        """Return the values as JSON can carry them."""
+        """Return JSON-compatible values."""
         known = np.isfinite(self.std_px).all()
         return {
             "matches": self.matches,
@@ -109,20 +109,20 @@ class Consistency:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a variant finds in two registered images.
+    """Result of a variant on two registered images.
 
     Parameters
     ----------
     variant
-        Its name.
+        Name of the variant.
     detections
-        Features of the reference and of the input.
+        Number of features in the reference and in the input.
     repeated
-        Which share of them correspond (see `repeatability`), shape (5,).
+        Share of corresponding features in each class (see `repeatability`), shape (5,).
     matched, filtered
-        Matches by the descriptors alone, and those that filtered matching leaves.
+        Matches by the descriptors alone, and those that remain after filtered matching.
     detecting_s, matching_s
-        Seconds for finding, and for describing and matching.
+        Seconds for detecting, and for describing and matching.
     """
 
     variant: str
@@ -134,7 +134,7 @@ class Evaluation:
     matching_s: float
 
     def summary(self) -> dict[str, Any]:
-        """Return the values as JSON can carry them."""
+        """Return JSON-compatible values."""
         return {
             "variant": self.variant,
             "detections": list(self.detections),
@@ -159,13 +159,14 @@ def evaluate(
     Parameters
     ----------
     variant
-        How.
+        Detector and descriptor.
     reference, input
-        The same place, pixel by pixel.
+        Images of the same ground, registered pixel by pixel.
     ratio, method
         See `matching.match`.
     parts
-        In which parts of the reference and of the input features count, shape (h, w); None: all.
+        Masks of the reference and of the input within which features count, shape (h, w); None:
+        everywhere.
     """
     started = time.perf_counter()
     found = [variant.detector.detect(patch) for patch in (reference, input)]

@@ -1,10 +1,10 @@
 """Fourier–Mellin: rotation and scale from magnitude spectra, then the shift.
 
-The magnitude of a spectrum does not change with a shift, rotates with the image, and shrinks as
-the image grows; on axes of angle and log frequency, both are shifts. Unlike the source's 22
-steps: spectra are normalised at each frequency, peaks are found between the bins, several are
-tried, and rotation, scale and shift are found again on what both windows show. Source:
-[Patel2017] 3.3.1, [Chen1994], [Reddy1996].
+The magnitude spectrum is invariant to shifts, rotates with the image, and shrinks as the image
+grows. On axes of angle and log frequency, rotation and scale are shifts. This implementation
+differs from the source's 22 steps: spectra are normalised at each frequency, peaks are found
+between the bins, several peaks are tried, and rotation, scale and shift are found again on the part
+that both windows show. Source: [Patel2017] 3.3.1, [Chen1994], [Reddy1996].
 """
 
 from __future__ import annotations
@@ -47,28 +47,28 @@ from .spectral_windows import (
     texture,
 )
 
-# A spectrum is given at so many log frequencies between two frequencies in cycles per pixel.
+# Number of log frequencies of a spectrum, and their range in cycles per pixel.
 _FREQUENCIES = 256
 _RANGE = (0.015, 0.4)
 _LOG_STEP = float(np.log(_RANGE[1] / _RANGE[0]) / (_FREQUENCIES - 1))
 
-# Detail of the correlation that is kept: standard deviation, in cycles per bin.
+# Low-pass filter of the correlation: standard deviation, in cycles per bin.
 _BAND = 0.1
 
-# Candidates of rotation and scale: how many are tried.
+# Number of candidate rotations and scales that are tried.
 CANDIDATES = 20
 
-# Candidates are tried on windows reduced to about this length, in pixels, …
+# Candidates are tried on windows reduced to about this side length, in pixels.
 _TRIAL_SIDE_PX = 128
-# … until one is so high that the others need no trial. Wrong ones were below 33.
+# A candidate of this height ends the trials. Wrong candidates stayed below 33.
 _SURE_HEIGHT = 60.0
 
-# Peaks that are nearer than this, in bins of rotation and scale, are the same.
+# Peaks within this neighbourhood, in bins of rotation and scale, count as one.
 _SAME = np.ones(
     [2 * round(n) + 1 for n in (SAME_DEG / ANGLE_STEP_DEG, SAME_LOG_SCALE / _LOG_STEP)], bool
 )
 
-# How far rotation and scale are corrected on what both windows show.
+# Limits for correcting rotation and scale on the part that both windows show.
 _CORRECTION = SearchLimits(0.0, 2.0, (0.95, 1.05))
 
 
@@ -80,7 +80,7 @@ def spectrum(image: Image, side: int) -> Image:
     image
         Shape (h, w).
     side
-        Sides of the square that it is padded to.
+        Side of the square that the image is padded to.
 
     Returns
     -------
@@ -108,12 +108,12 @@ def spectra(
 def correlate_spectra(reference: Image, input: Image) -> Surface:
     """Return the correlation of two spectra over all rotations and scales, normalised.
 
-    Rows are rotations, columns logarithms of the scale; the middle is none.
+    Rows are rotations, columns logarithms of the scale; the centre is no rotation at scale 1.
     """
     fading = np.sqrt(np.hanning(_FREQUENCIES + 2)[1:-1]).astype(np.float32)
     shape = (ANGLES, scipy.fft.next_fast_len(2 * _FREQUENCIES))
-    # The reference at a bin further on looks like the input: an input that is rotated
-    # counter-clockwise has its spectrum at smaller angles, a larger one at lower frequencies.
+    # The reference's spectrum matches the input's at a higher bin: a counter-clockwise rotation
+    # moves the input's spectrum to smaller angles, an enlargement to lower frequencies.
     first, second = (scipy.fft.fft2(s * fading, shape) for s in (reference, input))
     return normalise(correlation(first * second.conj(), _BAND, WHITENING).astype(np.float32))
 
@@ -140,7 +140,7 @@ def rotations(surface: Surface, limits: SearchLimits, count: int) -> Iterator[Po
 
 
 def remaining_pose(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
-    """Return what rotation, scale and shift are left between the parts that two windows share."""
+    """Return the residual rotation, scale and shift between the parts that two windows share."""
     surface = correlate_spectra(*spectra(both.reference, both.input, settings, disc=False))
     shift = remaining_shift(both, settings)
     if shift is None:
@@ -156,10 +156,9 @@ def try_poses(
     limits: SearchLimits,
     settings: SimilaritySettings,
 ) -> list[PoseFound]:
-    """Return the best shift at each of some rotations and scales, best first.
+    """Return the best shift at each of the given rotations and scales, best first.
 
-    Windows are reduced. No more poses are tried after one of `_SURE_HEIGHT`, but for its other
-    half turn.
+    The trials use reduced windows and stop at the first pose of at least `_SURE_HEIGHT`.
     """
     factor = max(round(min(reference.values.shape) / _TRIAL_SIDE_PX), 1)
     fixed = structure(reduced_patch(reference, factor), settings)
@@ -189,12 +188,12 @@ def fourier_mellin(
     reference, input
         The windows.
     limits
-        Within which rotation, scale and shift are searched for.
+        Limits of rotation, scale and shift.
     settings
-        "ncc" compares grey values; all else has its spectra made of their logarithms, and its
-        shift found on orientation fields.
+        "ncc" compares grey values; any other similarity takes spectra of their logarithms and
+        finds the shift on orientation fields.
     context
-        Threads to align the candidates in.
+        Provides threads to align the candidates.
     """
     if reference.is_flat or input.is_flat:
         return []

@@ -1,7 +1,7 @@
 """Estimators of the gradient of a SAR image ([Suri2010] 6.4).
 
-All return the derivatives along columns and rows. Differences are taken of grey values as they
-are; ratios, for which multiplicative noise is alike in bright and dark areas, of positive ones.
+All return the derivatives along columns and rows. Differences take any grey values. Ratios need
+positive ones; multiplicative noise has the same effect on them in bright and dark areas.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _TINY = np.float32(1e-6)
 def recursive_differences(image: FloatImage) -> Gradient:
     """Return Deriche's recursive differences (S eq 6.7–6.12; Deriche 1987, Paillou 1997).
 
-    The derivative filter x·exp(−α|x|) along one axis, its smoothing (α|x| + 1)·exp(−α|x|) along
-    the other, both of unit gain.
+    The derivative filter x·exp(−α|x|) runs along one axis and the smoothing filter
+    (α|x| + 1)·exp(−α|x|) along the other; both have unit gain.
     """
     return (
         _deriche_derivative(_deriche_smoothing(image, 0), 1),
@@ -35,10 +35,11 @@ def recursive_differences(image: FloatImage) -> Gradient:
 
 
 def log_ratios(image: FloatImage) -> Gradient:
-    """Return the logarithm of the ratio of exponentially weighted averages, with its sign.
+    """Return the signed logarithm of the ratio of exponentially weighted averages.
 
-    ROEWA ([Fjortoft1995]; S eq 6.13–6.22), but the average after the pixel over the one
-    before it, not the smaller of both ratios: its logarithm is positive where it gets brighter.
+    This is ROEWA ([Fjortoft1995]; S eq 6.13–6.22) with one difference: the ratio is always the
+    average after the pixel over that before it, not the smaller of both ratios. Its logarithm is
+    positive where the image gets brighter along the axis.
 
     Parameters
     ----------
@@ -49,23 +50,23 @@ def log_ratios(image: FloatImage) -> Gradient:
 
 
 def unsigned_log_ratios(image: FloatImage) -> Gradient:
-    """Return ROEWA as [Suri2010] has it: strength without a sign, so directions in 0 … 90° only."""
+    """Return ROEWA as in [Suri2010]: unsigned strengths, so directions of 0 … 90° only."""
     along_cols, along_rows = log_ratios(image)
     return np.abs(along_cols), np.abs(along_rows)
 
 
 def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
-    """Return the exponentially weighted average of each pixel and all before it.
+    """Return the exponentially weighted average of each pixel and all pixels before it.
 
-    The causal filter h1 of [Suri2010] eq 6.14, 6.19 and 6.20, (1 − b) bˣ; the first pixel goes on
-    forever before the image.
+    This is the causal filter h1 of [Suri2010] eq 6.14, 6.19 and 6.20, (1 − b) bˣ. The first pixel
+    is repeated infinitely before the image.
 
     Parameters
     ----------
     image
         Shape (h, w), float32.
     decay
-        b, from 0 to 1: the weight of a pixel against its neighbour's.
+        b, from 0 to 1: ratio of a pixel's weight to that of the pixel one step nearer.
     axis
         0: along rows, 1: along columns.
     """
@@ -73,7 +74,7 @@ def average_before(image: FloatImage, decay: float, axis: int) -> FloatImage:
 
 
 def average_after(image: FloatImage, decay: float, axis: int) -> FloatImage:
-    """Return the exponentially weighted average of each pixel and all after it (h2)."""
+    """Return the exponentially weighted average of each pixel and all pixels after it (h2)."""
     return np.flip(average_before(np.flip(image, axis), decay, axis), axis)
 
 
@@ -85,7 +86,7 @@ def _log_ratio(image: FloatImage, axis: int) -> FloatImage:
 
 
 def _shifted(image: FloatImage, by: int, axis: int) -> FloatImage:
-    """Return an image moved by a pixel, its border repeated: averages leave the pixel out."""
+    """Return an image moved by one pixel, border repeated, so averages exclude the pixel itself."""
     moved = np.roll(image, by, axis)
     edge = [slice(None)] * 2
     edge[axis] = slice(0, 1) if by > 0 else slice(-1, None)
@@ -103,7 +104,7 @@ def _deriche_smoothing(image: FloatImage, axis: int) -> FloatImage:
 
 def _deriche_derivative(image: FloatImage, axis: int) -> FloatImage:
     decay = np.exp(-_ALPHA)
-    # A ramp of slope one gives one.
+    # Unit gain: a ramp of slope one gives one.
     gain = (1 - decay) ** 3 / (2 * decay * (1 + decay))
     weights = gain * np.array([0, decay, 0])
     return _two_passes(image, weights, weights, -1.0, axis)
@@ -116,7 +117,7 @@ def _two_passes(
     sign: float,
     axis: int,
 ) -> FloatImage:
-    """Return `sign`·(what the pixels before give) + (what the pixels after give), second order."""
+    """Return `sign` · causal part + anticausal part of a second-order recursive filter."""
     decay = np.exp(-_ALPHA)
     recursion = np.array([1, -2 * decay, decay**2])
     causal = _recursive(image, before, recursion, axis)
@@ -127,11 +128,11 @@ def _two_passes(
 def _recursive(
     image: FloatImage, weights: NDArray[np.float64], recursion: NDArray[np.float64], axis: int
 ) -> FloatImage:
-    """Return what a recursive filter makes of each pixel and all before it along an axis.
+    """Return the output of a causal recursive filter along an axis.
 
-    The first pixel goes on forever before the image.
+    The first pixel is repeated infinitely before the image.
     """
-    # Late: few features need it, and this package takes long to import.
+    # Imported here because scipy.signal is slow to import and few features need it.
     from scipy.signal import lfilter, lfilter_zi
 
     shape = (-1, 1) if axis == 0 else (1, -1)
@@ -141,7 +142,7 @@ def _recursive(
     return np.asarray(lfilter(weights, recursion, image, axis=axis, zi=start)[0])
 
 
-# What each estimator is called, and whether it needs positive grey values.
+# The estimators by name, each with whether it needs positive grey values.
 _ESTIMATORS: dict[str, tuple[GradientOperator, bool]] = {
     "differences": (differences, False),
     "recursive": (recursive_differences, False),
@@ -152,10 +153,10 @@ GRADIENTS = tuple(_ESTIMATORS)
 
 
 def gradient_operator(name: str) -> GradientOperator:
-    """Return the operator of a name of `GRADIENTS`."""
+    """Return the operator for a name in `GRADIENTS`."""
     return _ESTIMATORS[name][0]
 
 
 def needs_positive(name: str) -> bool:
-    """Return whether an operator is one of ratios."""
+    """Return whether an operator takes ratios, and so needs positive grey values."""
     return _ESTIMATORS[name][1]

@@ -1,7 +1,7 @@
-"""SURF's descriptor: sums of Haar wavelets around a keypoint, as 64 numbers ([Bay2008]).
+"""The SURF descriptor: 64 sums of Haar wavelet responses around a keypoint ([Bay2008]).
 
-Wavelets are looked up in the integral image at places that rotate and grow with the keypoint,
-for all keypoints at once.
+Responses come from the integral image, at samples that rotate and scale with the keypoint, for all
+keypoints at once.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from .box_hessian import FloatImage, IntegralImage, integral_image
 CELLS = 4
 LENGTH = 4 * CELLS * CELLS
 
-# Samples along a cell's side, a scale apart, and width of the Gaussian window in scales.
+# Samples along a cell's side, one scale apart, and width of the Gaussian window in scales.
 _SAMPLES = 5
 _WINDOW_SCALES = 3.3
 
-# Half the side of the wavelets in scales: of the descriptor, and of the orientation.
+# Half the side of the wavelets in scales, for the descriptor and for the orientation.
 _HALF_SCALES, _ORIENTATION_HALF_SCALES = 1.0, 2.0
 
-# Orientation: reach and width of its window in scales; bins, of which a sector of 60° is summed.
+# Orientation: reach and width of its window in scales; number of bins, and bins in a 60° sector.
 _REACH_SCALES, _ORIENTATION_WINDOW_SCALES = 6, 2.0
 _BINS = 72
 _SECTOR_BINS = _BINS // 6
 
-# So many features are described at a time.
+# Number of features that are described at a time.
 _BLOCK = 512
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Integral images of grey values and of what is masked (None: nothing)."""
+    """Integral images of grey values and of the mask (None: nothing is masked)."""
 
     grey: IntegralImage
     masked: IntegralImage | None
@@ -54,7 +54,7 @@ class HaarDescriptor:
     Parameters
     ----------
     upright
-        Whether features keep the image's axes; else each is rotated by its own orientation.
+        Whether features keep the image's axes; otherwise each has its own orientation.
     """
 
     upright: bool = True
@@ -62,23 +62,23 @@ class HaarDescriptor:
     def describe(
         self, window: Patch, found: Keypoints, context: Context | None = None
     ) -> tuple[Keypoints, FloatImage]:
-        """Return the features, oriented if they are to be, and what is around them.
+        """Return the features, oriented unless `upright`, and their descriptors.
 
         Parameters
         ----------
         window
-            The image; wavelets that see masked pixels count as zero.
+            The image; wavelets that cover masked pixels count as zero.
         found
-            Features in it, shape (n,).
+            Features in the image, shape (n,).
         context
-            Threads to work in; None: this one.
+            Provides threads; None: the current one only.
 
         Returns
         -------
         points, descriptors
             The n features and their descriptors of unit length (zero where there is no contrast),
-            shape (n, 64) float32: rows and columns of cells, then the sums of the wavelets along
-            columns and rows, and of their absolute values.
+            shape (n, 64) float32. The order is rows and columns of cells, then the sums of the
+            wavelets along columns and rows, and the sums of their absolute values.
         """
         masked = None if window.all_valid else _counts(~window.valid)
         sums = _Sums(integral_image(compress(window)), masked)
@@ -103,7 +103,7 @@ def _counts(mask: NDArray[np.bool_]) -> IntegralImage:
 def _wavelets(
     sums: _Sums, points: Keypoints, samples: FloatArray, half_scales: float
 ) -> tuple[FloatImage, FloatImage]:
-    """Return Haar wavelets at samples around each feature.
+    """Return Haar wavelet responses at samples around each feature.
 
     Parameters
     ----------
@@ -112,19 +112,19 @@ def _wavelets(
     points
         n features.
     samples
-        In scales of a feature, along and across its orientation, shape (m, 2).
+        Offsets in scales of a feature, along and across its orientation, shape (m, 2).
     half_scales
         Half the wavelets' side, in scales.
 
     Returns
     -------
-    Wavelets along and across the features' orientation, shape (n, m) each.
+    Responses along and across the features' orientation, shape (n, m) each.
     """
     cosine, sine = np.cos(points.orientation_rad)[:, None], np.sin(points.orientation_rad)[:, None]
     x, y = samples_around(points, samples)
     half = np.maximum(np.rint(half_scales * points.scale_px[:, None]), 1).astype(np.intp)
     height, width = sums.grey.shape
-    # Positions of the integral image are the corners of pixels.
+    # Positions in the integral image are pixel corners.
     col, row = np.rint(x + 0.5).astype(np.intp), np.rint(y + 0.5).astype(np.intp)
     cols = [np.clip(col + by, 0, width - 1) for by in (-half, 0, half)]
     rows = [np.clip(row + by, 0, height - 1) * width for by in (-half, 0, half)]
@@ -137,7 +137,7 @@ def _wavelets(
         top, bottom = ([hidden[rows[k] + cols[0]], hidden[rows[k] + cols[2]]] for k in (0, 2))
         seen = bottom[1] - bottom[0] - top[1] + top[0] == 0
         along_cols, along_rows = along_cols * seen, along_rows * seen
-    # Wavelets of any size are alike: mean differences.
+    # Mean differences make the responses of wavelets of all sizes comparable.
     area = half**2
     along = (cosine * along_cols + sine * along_rows) / area
     across = (cosine * along_rows - sine * along_cols) / area
@@ -155,7 +155,7 @@ def _described(sums: _Sums, points: Keypoints) -> FloatImage:
 
 
 def _orientations(sums: _Sums, points: Keypoints) -> FloatArray:
-    """Return the direction in which most wavelets of a sector of 60° point, shape (n,)."""
+    """Return the direction of the largest vector sum over any 60° sector, shape (n,)."""
     samples = square_samples(_REACH_SCALES + 0.5, 2 * _REACH_SCALES + 1)
     squared = (samples**2).sum(axis=1)
     samples, squared = samples[squared < _REACH_SCALES**2], squared[squared < _REACH_SCALES**2]

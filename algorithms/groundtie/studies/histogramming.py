@@ -1,12 +1,13 @@
 """The joint histogram of a template and an image under any affine transform ([Suri2010] 3.4.2).
 
-In one step: each template pixel is spread over the bins of the image pixels around its place, with
-the weights of a B-spline: generalised partial volume estimation (GPVE; [Chen2003], [Suri2010] eq
-3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which has false maxima; from order
-4 on there are none. Two steps, which interpolate the image and count one entry, have them too:
-interpolation smooths the image between its pixels and not on them.
+Counting takes one step: each template pixel is spread over the bins of the surrounding image
+pixels with the weights of a B-spline. This is generalised partial volume estimation (GPVE;
+[Chen2003], [Suri2010] eq 3.34). Order 2 is partial volume interpolation (PVI [Maes1997]), which has
+false maxima; orders of 4 and above have none. The two-step alternative, which interpolates the
+image and counts one entry, has false maxima too: interpolation smooths the image between its pixels
+but not on them.
 
-For shifts alone `joint_histogram` counts many transforms at once.
+For pure shifts, `joint_histogram` counts many transforms at once.
 """
 
 from __future__ import annotations
@@ -36,28 +37,28 @@ from ..similarity.measures import HistogramMeasure
 
 Bins = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Value of masked pixels among grey levels of 16 bits, as `binning.MASKED` among those of 8.
+# Value of masked pixels in 16-bit grey levels; `binning.MASKED` is its 8-bit counterpart.
 MASKED_LEVEL = np.uint16(65_535)
 
-# Up to so many template pixels every weight is summed up; beyond, that takes too long for a search.
+# Largest number of template pixels whose weights are all summed; more would slow down a search.
 _EXACT_PIXELS = 20_000
 
-# If histograms of all shifts need more memory than this, each is counted by itself.
+# If the histograms of all shifts need more memory than this, they are counted one by one.
 _MOST_VOLUME_BYTES = 150_000_000
 
 
 def to_levels(
     image: Patch, bins: int | None = None, binning: str = "equal-frequency"
 ) -> tuple[NDArray[np.uint16], int]:
-    """Return each pixel's grey level, `MASKED_LEVEL` where it is not valid, and their number.
+    """Return each pixel's grey level, `MASKED_LEVEL` where invalid, and the number of levels.
 
     Parameters
     ----------
     image
         Grey values.
     bins
-        Number of levels, up to 65 535; None: every grey value that occurs is a level of its own,
-        as [Suri2010] for images of 11 and 16 bits "without binning".
+        Number of levels, up to 65 535. None: every grey value that occurs is a level of its own,
+        as in [Suri2010] for 11-bit and 16-bit images "without binning".
     binning
         One of `binning.BINNINGS`.
 
@@ -88,20 +89,20 @@ def joint_histogram_under(
     order: int = ORDER,
     seed: int = 0,
 ) -> FloatArray:
-    """Return the joint histogram of a template and an image under an affine transform, one step.
+    """Return the joint histogram of a template and an image under an affine transform, by GPVE.
 
-    With up to 20 000 template pixels the weights of GPVE are summed up as they are. More pixels
-    are moved each by a random offset, drawn from the B-spline of one order less, and counted with
-    the nearest image pixel: its expectation is GPVE, its noise is that of counting alone, and it
-    takes as long for every order (500 × 500 px: 4 ms, where the weights of order 4 take 55 ms; a
-    twelfth of the pixels with their weights would be noisier). The same seed gives the same
-    offsets for every transform, so that a search sees one function.
+    Up to 20 000 template pixels are counted with exact GPVE weights. Above that, each pixel is
+    moved by a random offset, drawn from the B-spline of the next lower order, and counted with
+    the nearest image pixel. The expectation is GPVE; the only noise is counting noise. The cost
+    is the same for every order (500 × 500 px: 4 ms; exact weights of order 4 take 55 ms, and
+    exact weights for a twelfth of the pixels would be noisier). The same seed gives the same
+    offsets for every transform, so that a search optimises one fixed function.
 
     Parameters
     ----------
     template, image
-        Bins, shapes (h, w) and (H, W), with `binning.MASKED` where a pixel does not count; or
-        grey levels with `MASKED_LEVEL`.
+        Bins, shapes (h, w) and (H, W), with `binning.MASKED` for excluded pixels; or grey levels
+        with `MASKED_LEVEL`.
     to_image
         From template to image pixels (col, row), pixel centres at integers.
     counts
@@ -109,11 +110,11 @@ def joint_histogram_under(
     order
         Order of the B-spline, 2 (partial volume interpolation) to 7; 1 is nearest neighbour.
     seed
-        Of the random offsets.
+        Seed of the random offsets.
 
     Returns
     -------
-    Histogram, shape `counts`. Weights that fall outside the image or on masked pixels drop out.
+    Histogram, shape `counts`. Weights outside the image or on masked pixels are dropped.
     """
     own, x, y = _places(template, to_image)
     if order > 1 and own.size > _EXACT_PIXELS:
@@ -129,10 +130,10 @@ def joint_histogram_under(
 def sparse_joint_histogram_under(
     template: Bins, image: Bins, to_image: Affine, counts: tuple[int, int], order: int = ORDER
 ) -> Any:
-    """Return the joint histogram of `joint_histogram_under` as a sparse matrix, by exact weights.
+    """Return the joint histogram under an affine transform as a sparse matrix, by exact weights.
 
-    For images of thousands of grey levels: only cells that occur take memory. Parameters as
-    there; the measures take sparse histograms, too.
+    Meant for images with thousands of grey levels: only occupied cells take memory. The measures
+    accept sparse histograms. The parameters are those of `joint_histogram_under`.
 
     Returns
     -------
@@ -157,15 +158,15 @@ def measure_surface(
     order: int,
     context: Context,
 ) -> NDArray[np.float32]:
-    """Return a measure of the joint histogram over all whole shifts.
+    """Return a measure of the joint histogram at all whole-pixel shifts.
 
     Parameters
     ----------
     template
         Bins or grey levels as for `joint_histogram_under`, shape (h, w).
     search
-        The same of a window with the same centre that is larger on each side by the radius and
-        by `joint_histogram.reach` of the order.
+        The same for a concentric window that is larger on each side by the radius plus
+        `joint_histogram.reach` of the order.
     counts
         Number of bins of template and search window.
     measure
@@ -173,11 +174,11 @@ def measure_surface(
     order
         Order of the B-spline, 2 to 7.
     context
-        Threads to count in; its progress receives every row.
+        Provides the threads; its progress receives every row.
 
     Returns
     -------
-    Array of shape (2 radius + 1, 2 radius + 1); infinite where single precision cannot hold it.
+    Array of shape (2 radius + 1, 2 radius + 1); infinite where single precision overflows.
     """
     margin = reach(order)
     span = search.shape[0] - template.shape[0] - 2 * margin + 1
@@ -212,10 +213,10 @@ def _places(template: Bins, to_image: Affine) -> tuple[Bins, FloatArray, FloatAr
 def _contributions(
     own: Bins, image: Bins, x: FloatArray, y: FloatArray, counts: tuple[int, int], order: int
 ) -> Iterator[tuple[NDArray[np.intp], FloatArray | None]]:
-    """Yield, for each of the order² image pixels around the places, what the histogram gets.
+    """Yield the histogram entries for each of the order² image pixels around the places.
 
-    That is, for each template pixel, the number of the cell and its weight (None: 1). Cells are
-    those of a histogram with one bin more on each side, for what does not count.
+    An entry holds, for each template pixel, the number of the cell and its weight (None: 1). The
+    cells are those of a histogram with one extra bin per axis, which takes the excluded pixels.
     """
     codes = np.minimum(own, counts[0]).astype(np.intp) * (counts[1] + 1)
     padded = np.pad(np.minimum(image, counts[1]), 1, constant_values=counts[1]).ravel()
@@ -226,16 +227,16 @@ def _contributions(
         start = row * stride
         for col, weight_x in zip(cols, along_x, strict=True):
             weights = None if order == 1 else weight_y * weight_x
-            # Under whole shifts, pixels at the ends of even orders' kernels have no weight.
+            # Under whole-pixel shifts, the end pixels of even-order kernels have zero weight.
             if weights is None or weights.any():
                 yield codes + padded[start + col], weights
 
 
 def _neighbours(position: FloatArray, size: int, order: int) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the pixels that a B-spline at each position reaches, and their weights.
+    """Return the pixels in the support of a B-spline at each position, and their weights.
 
-    Both have shape (order, n). Pixels are counted from a border of one pixel; those outside of
-    the image lie on the border.
+    Both have shape (order, n). Pixels are counted from a border of one pixel, which also stands
+    for all pixels outside the image.
     """
     start = position - order / 2
     first = np.floor(start)
@@ -247,7 +248,7 @@ def _neighbours(position: FloatArray, size: int, order: int) -> tuple[NDArray[np
 
 @functools.lru_cache(maxsize=4)
 def _offsets(order: int, seed: int, count: int) -> FloatArray:
-    """Return random offsets (x, y) with the B-spline as density, shape (2, count)."""
+    """Return random offsets (x, y) whose density is the B-spline, shape (2, count)."""
     rng = np.random.default_rng(seed)
     offsets = rng.random((order, 2, count)).sum(axis=0) - order / 2
     offsets.flags.writeable = False

@@ -1,4 +1,4 @@
-"""Which keypoints belong together by their descriptors alone, and filtered by a model."""
+"""Keypoint matching by descriptors alone, and filtering of matches by a model."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..memory import AT_ONCE
 
 METHODS = ("exact", "kd-tree")
 
-# The forest of k-d trees, and how many leaves are looked at (best bin first; [Beis1997]).
+# Number of k-d trees, and of leaves that a query visits (best bin first; [Beis1997]).
 _TREES = 4
 _CHECKS = 64
 
-# Filtered matching: largest residual in standard deviations of all residuals; smaller ones than
-# the second are rounding.
+# Filtered matching: largest residual in standard deviations of all residuals, and the residual
+# below which differences are rounding errors.
 _SIGMAS = 2.0
 _ROUNDING_PX = 1e-6
 
@@ -37,12 +37,12 @@ def match(
     first, second
         Descriptors, shapes (n, k) and (m, k).
     ratio
-        Largest ratio of the distances to the nearest and to the next partner; at 1 each keypoint
-        keeps its nearest one.
+        Largest ratio of the distances to the nearest and to the second-nearest partner; at 1 each
+        keypoint keeps its nearest partner.
     mutual
-        Whether each must be the other's nearest.
+        Whether both keypoints of a match must be each other's nearest.
     method
-        "exact", or "kd-tree": approximately, by a forest of k-d trees.
+        "exact", or "kd-tree" for an approximate search by a forest of k-d trees.
     """
     found = Matches.of(_nearest(first, second, method))
     found = found.take(found.ratio <= ratio)
@@ -55,16 +55,16 @@ def match(
 def filter_matches(
     px: FloatArray, partner_px: FloatArray, kind: str = "affine"
 ) -> NDArray[np.bool_]:
-    """Return which matches remain when the worst is dropped until none is far off.
+    """Return a mask of the matches that remain after the worst are dropped one by one.
 
-    Filtered matching, [Suri2010] 3.4.4 and 6.7.1: a model is fitted to all, the match with the
-    largest residual is dropped, the model is fitted again, until all residuals are below so many
-    of their standard deviations. It needs more right than wrong matches to start from.
+    Filtered matching, [Suri2010] 3.4.4 and 6.7.1: fit a model to all matches, drop the match with
+    the largest residual, and repeat until all residuals are at most two of their standard
+    deviations. It needs more inliers than outliers to start from.
 
     Parameters
     ----------
     px, partner_px
-        Positions that belong together, shape (n, 2).
+        Positions of matched keypoints, shape (n, 2).
     kind
         One of `models.KINDS`.
 
@@ -116,7 +116,7 @@ def _two_nearest(first: Descriptors, second: Descriptors) -> tuple[Indices, Floa
 
 
 def _two_nearest_by_trees(first: Descriptors, second: Descriptors) -> tuple[Indices, FloatArray]:
-    # The trees are drawn at random: the same seed, the same result.
+    # The trees are random: a fixed seed makes the result reproducible.
     cv2.setRNGSeed(0)
     index = cv2.flann.Index(second, {"algorithm": 1, "trees": _TREES})
     found, squared = index.knnSearch(first, 2, params={"checks": _CHECKS})

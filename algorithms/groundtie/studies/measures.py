@@ -1,4 +1,4 @@
-"""Measures on joint histograms that studies compare with the product's ([Suri2010] 3.3, 2.3.1)."""
+"""Joint-histogram measures that studies compare with the product's ([Suri2010] 3.3, 2.3.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..similarity.measures import (
     tables,
 )
 
-# Shares and variances below this hold rounding only.
+# Shares and variances below this are rounding errors.
 _NOTHING = 1e-9
 
 
@@ -32,8 +32,8 @@ def renyi_mutual_information(alpha: float) -> HistogramMeasure:
     Parameters
     ----------
     alpha
-        Order of the entropy, any real number; 1 is Shannon's, as the limit. Other than Shannon's,
-        the measure may be negative.
+        Order of the entropy, any real number; 1 is Shannon's, as the limit. Unlike Shannon's, the
+        measure of other orders may be negative.
     """
     if alpha == 1:
         return mutual_information
@@ -48,8 +48,8 @@ def renyi_mutual_information(alpha: float) -> HistogramMeasure:
 def tsallis_mutual_information(q: float) -> HistogramMeasure:
     """Return the measure S(A) + S(B) + (1 - q) S(A) S(B) - S(A, B) ([Suri2010] eq 3.17, 3.18).
 
-    The cross term makes it 0 for independent images, as Tsallis' entropy is not additive. With
-    S = (Σ p^q - 1) / (1 - q) all of it is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
+    Tsallis' entropy is not additive; the cross term makes the measure 0 for independent images.
+    With S = (Σ p^q - 1) / (1 - q) the measure is (Σ p_A^q Σ p_B^q - Σ p_AB^q) / (1 - q).
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def tsallis_mutual_information(q: float) -> HistogramMeasure:
         return mutual_information
 
     def measure(histograms: Histograms) -> FloatArray:
-        # Far from 1, powers are infinite, and the measure is no number.
+        # Far from 1, powers are infinite, and the measure is NaN.
         with np.errstate(over="ignore", invalid="ignore"):
             a, b, ab = (np.exp(_log_power_sum(table, q)) for table in tables(histograms))
             return np.asarray((a * b - ab) / (1 - q))
@@ -71,8 +71,8 @@ def tsallis_mutual_information(q: float) -> HistogramMeasure:
 def cluster_reward(histograms: Histograms) -> FloatArray:
     """Return the index of the cluster reward algorithm, 0 (independent) to 1 (one to one).
 
-    (Φ / F - F / N²) / (1 - F / N²) with Φ the sum of the squared joint counts, F² the product of
-    the sums of the squared marginal counts and N the number of pixels [Inglada2004].
+    It is (Φ / F - F / N²) / (1 - F / N²), where Φ is the sum of the squared joint counts, F² the
+    product of the sums of the squared marginal counts and N the number of pixels [Inglada2004].
     """
     a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in tables(histograms))
     chance = np.sqrt(a * b)
@@ -82,11 +82,10 @@ def cluster_reward(histograms: Histograms) -> FloatArray:
 
 
 def correlation_ratio(histograms: Histograms) -> FloatArray:
-    """Return which share of A's variance a function of B explains, 0 to 1.
+    """Return the share of A's variance that a function of B explains, 0 to 1.
 
-    Source: [Roche1998]. The grey value of a bin is its number. A should be
-    the template: its variance is the same at all shifts. For the other way round transpose the
-    histogram.
+    Source: [Roche1998]. The grey value of a bin is its number. A should be the template, whose
+    variance is the same at all shifts. To swap the roles, transpose the histogram.
     """
     a, b, _ = tables(histograms)
     levels = np.arange(a.shape[-1], dtype=float)
@@ -100,7 +99,7 @@ def correlation_ratio(histograms: Histograms) -> FloatArray:
 
 
 def _at_least(counts: FloatArray) -> FloatArray:
-    """Return counts to divide by: a bin without pixels has a numerator of 0 as well."""
+    """Return counts as divisors, with 1 for empty bins, whose numerators are 0 as well."""
     return np.where(counts > 0, counts, 1.0)
 
 
@@ -109,18 +108,18 @@ def _shares(table: FloatArray) -> FloatArray:
 
 
 def _log_power_sum(table: FloatArray, power: float) -> FloatArray:
-    """Return ln Σ p^power over the occupied cells; 0 for an empty table, as for a constant."""
+    """Return ln Σ p^power over the occupied cells; 0 for an empty or a one-cell table."""
     shares = _shares(table.astype(float))
     occupied = shares > 0
     exponents = np.where(occupied, power * np.log(np.where(occupied, shares, 1.0)), -np.inf)
-    # Relative to the largest term, which a high power alone would round to 0.
+    # Relative to the largest term, which a high power would otherwise round to 0.
     largest = exponents.max(axis=-1, keepdims=True, initial=-np.inf)
     largest = np.where(np.isfinite(largest), largest, 0.0)
     total = np.exp(exponents - largest).sum(axis=-1)
     return np.log(np.where(total > 0, total, 1.0)) + largest[..., 0]
 
 
-# With the usual orders of the parametrised ones.
+# The parametrised entropies have their usual orders here.
 HISTOGRAM_MEASURES: Mapping[str, HistogramMeasure] = MappingProxyType(
     {
         "nmi": normalized_mutual_information,

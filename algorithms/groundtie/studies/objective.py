@@ -1,8 +1,8 @@
 """The similarity of two windows as a function of their pose, for searches that climb it.
 
-Grey values are sorted into bins once. Whole-pixel shifts of equally large pixels are counted at
-aligned grids, which is cheap; any other pose by generalised partial volume estimation. Source:
-[Suri2010], section 4.4.2.
+Grey values are binned once. Poses that align the pixel grids are counted directly, which is cheap;
+any other pose is counted by generalised partial volume estimation. Source: [Suri2010], section
+4.4.2.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ Bins = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class BinnedPair:
-    """Two windows, binned, and how their similarity is measured.
+    """Two binned windows and the measure of their similarity.
 
     Parameters
     ----------
     template, image
-        Bins of the reference and the input, `MASKED` where a pixel does not count.
+        Bins of the reference and the input, `MASKED` for excluded pixels.
     counts
         Number of bins of each.
     measure
         Similarity of a joint histogram.
     order
-        Order of the B-spline for poses between aligned grids.
+        Order of the B-spline for poses that do not align the grids.
     """
 
     template: Bins
@@ -52,7 +52,7 @@ class BinnedPair:
 
     @cached_property
     def nothing(self) -> float:
-        """The similarity of independent images with these grey values: where none overlap."""
+        """Similarity of independent images with these bins; it stands for too little overlap."""
         own, other = (
             np.bincount(bins[bins != MASKED], minlength=count).astype(float)
             for bins, count in zip((self.template, self.image), self.counts, strict=True)
@@ -65,14 +65,14 @@ class BinnedPair:
 
     @property
     def origin(self) -> tuple[float, float]:
-        """Shift (right, down) of the aligned grids nearest to 0: 0, or -0.5 for unlike parity."""
+        """Shift (right, down) nearest to 0 that aligns the grids: 0, or -0.5 for unlike parity."""
         height, width = np.subtract(self.image.shape, self.template.shape)
         return width // 2 - width / 2, height // 2 - height / 2
 
     def aligned(self, shift_px: tuple[float, float]) -> float:
-        """Return the similarity at a shift (right, down) at which the pixel grids meet.
+        """Return the similarity at a shift (right, down) that aligns the pixel grids.
 
-        Such shifts are whole numbers of pixels from `origin`.
+        Such shifts differ from `origin` by whole pixels.
         """
         pairs = zip(shift_px, self.image.shape[::-1], self.template.shape[::-1], strict=True)
         right, down = (round(s + (image - own) / 2) for s, image, own in pairs)
@@ -80,7 +80,7 @@ class BinnedPair:
         image = _shifted(self.image, (right, down), self.template.shape)
         if template.size == 0:
             return self.nothing
-        # Masked pixels go to one extra bin that is dropped; OpenCV's own mask is much slower.
+        # Masked pixels go into an extra bin that is dropped; OpenCV's own mask is much slower.
         sizes = [count + 1 for count in self.counts]
         pair = [np.minimum(template, self.counts[0]), np.minimum(image, self.counts[1])]
         ranges = [0, sizes[0], 0, sizes[1]]
@@ -95,22 +95,22 @@ class BinnedPair:
         )
 
     def _similarity(self, histogram: NDArray[np.float64]) -> float:
-        """Return the measure, or what independent images have where too little overlaps."""
+        """Return the measure, or that of independent images where the overlap is too small."""
         if histogram.sum() < self._least:
             return self.nothing
         return float(self.measure(histogram))
 
 
 def _shifted(bins: Bins, start: tuple[int, int], shape: tuple[int, ...]) -> Bins:
-    """Return the part of an image that a window of a shape, put at (col, row), covers."""
+    """Return the part of an image under a window of the given shape placed at (col, row)."""
     (col, row), (height, width) = start, shape
     return bins[max(row, 0) : max(row + height, 0), max(col, 0) : max(col + width, 0)]
 
 
 def bin_pair(reference: Patch, input: Patch, settings: SimilaritySettings) -> BinnedPair | None:
-    """Return two windows binned, or None if one of them is flat and has nothing to compare.
+    """Return two windows binned, or None if one of them is flat.
 
-    Of the similarity "fused", only what is measured on joint histograms takes part: NMI.
+    For the similarity "fused", only its joint-histogram measure is used: NMI.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Orientations of keypoints by their gradients, for images that may be rotated ([Lowe2004])."""
+"""Keypoint orientations from gradients, for images that may be rotated ([Lowe2004])."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..features.scale_space import (
 )
 from ..rasters.reading import FloatImage
 
-# Orientation: bins of its histogram, width of its window in scales, how far it reaches in widths,
-# and how high a further peak must be.
+# Orientation: bins of its histogram, width of its window in scales, reach of the window in widths,
+# and least height of a further peak as a share of the highest.
 _BINS = 36
 _ORIENTATION_SCALES = 1.5
 _REACH_WIDTHS = 3.0
@@ -28,7 +28,7 @@ _ORIENTATION_SAMPLES = 19
 
 
 def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np.int_]]:
-    """Return keypoints once for each of their orientations, and which of `points` each one is."""
+    """Return keypoints, one for each orientation, and the index of each in `points`."""
     half = _REACH_WIDTHS * _ORIENTATION_SCALES
     samples = square_samples(half, _ORIENTATION_SAMPLES)
     samples = samples[np.hypot(*samples.T) <= half]
@@ -62,17 +62,17 @@ def describe_at_scales(
     upright: bool,
     gradient: GradientOperator = differences,
 ) -> tuple[Keypoints, FloatImage]:
-    """Return keypoints, once for each of their orientations if not upright, and their descriptors.
+    """Return keypoints, one for each orientation unless upright, and their descriptors.
 
     Parameters
     ----------
     image, valid, found, gradient
-        As `gradients_at_scales` takes them.
+        As for `gradients_at_scales`.
     describe
-        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale, in
-        whose pixels they are.
+        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale. The
+        keypoints are given in pixels of that gradient.
     length
-        How many values a descriptor has.
+        Number of values of a descriptor.
     upright
         Whether keypoints keep the image's axes.
     """

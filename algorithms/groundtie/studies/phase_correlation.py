@@ -1,7 +1,7 @@
 """Phase correlation: the shift between two windows from the phases of their spectra.
 
-The cross-power spectrum is divided by its magnitude, which leaves a peak instead of the broad
-hill of a plain correlation. Source: [Kuglin1975]; [Patel2017], section 3.3.1, steps 16–21.
+Dividing the cross-power spectrum by its magnitude turns the broad maximum of a plain correlation
+into a sharp peak. Source: [Kuglin1975]; [Patel2017], section 3.3.1, steps 16–21.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from .spectral_windows import (
     structure,
 )
 
-# How many shifts are returned at most.
+# Largest number of shifts that are returned.
 CANDIDATES = 4
 
-# Peaks of one surface that are nearer than this are the same.
+# Peaks of one surface within this neighbourhood count as one.
 _SAME = np.ones((2 * int(SAME_PX) + 1,) * 2, bool)
 
-# Frequencies beyond this (standard deviation, in cycles per pixel) hold noise and what resampling
-# has left; without them the peak is a Gaussian of 0.8 px.
+# Low-pass filter (standard deviation, in cycles per pixel): higher frequencies hold noise and
+# resampling artefacts. With it, the peak is a Gaussian of 0.8 px.
 BAND = 0.2
 
-# How far a shift can be corrected once the windows have been cut to what they share.
+# Largest correction of a shift once the windows have been cropped to the part they share.
 CORRECTION_PX = 8.0
 
 
@@ -54,8 +54,8 @@ class PhaseSurface:
     values
         Shape (h, w), float32.
     right_px, down_px
-        By how much the input's centre lies right of and below the reference's, for columns
-        and rows.
+        Shift of the input's centre to the right of and below the reference's centre, for each
+        column and each row of `values`.
     """
 
     values: Surface
@@ -70,11 +70,11 @@ class PhaseSurface:
         Parameters
         ----------
         linear
-            What rotates and scales shifts of the surface into those of the input, shape (2, 2).
+            Matrix that rotates and scales shifts of the surface into input shifts, shape (2, 2).
         radius_px
             Largest shift along rows and columns, in input pixels.
         count
-            How many are wanted.
+            Number of peaks.
         """
         searched = np.where(self.within(linear, radius_px), self.values, 0)
         found = []
@@ -86,12 +86,12 @@ class PhaseSurface:
         return found
 
     def within(self, linear: NDArray[np.float64], radius_px: float) -> NDArray[np.bool_]:
-        """Return at which shifts the input itself is shifted by no more than a radius.
+        """Return a mask of the surface's shifts that shift the input by no more than a radius.
 
         Parameters
         ----------
         linear, radius_px
-            As of `peaks`.
+            As in `peaks`.
         """
         right, down = self.right_px[None, :], self.down_px[:, None]
         return np.logical_and.reduce(
@@ -107,9 +107,9 @@ def phase_surface(
     Parameters
     ----------
     reference, input
-        Real or complex, shapes (h, w) and (m, n); their centres are compared.
+        Real or complex, shapes (h, w) and (m, n); shifts are those between their centres.
     wrap
-        Whether shifts are known to be small: images of one shape are then not padded.
+        Whether shifts are known to be small; images of equal shape are then not padded.
     """
     pairs = list(zip(reference.shape, input.shape, strict=True))
     sides = [max(pair) if wrap else sum(pair) for pair in pairs]
@@ -143,7 +143,7 @@ def shifts_at(
     settings
         How similarity is measured.
     count
-        How many shifts are wanted.
+        Number of shifts.
     """
     shape = covering_shape(input.values.shape, pose, reference.shape)
     back = input if pose == Pose() else resampled(input, pose, shape, "bilinear")
@@ -159,7 +159,7 @@ def shifts_at(
 
 
 def remaining_shift(both: Shared, settings: SimilaritySettings) -> PoseFound | None:
-    """Return the shift that is left between the parts that two windows share."""
+    """Return the residual shift between the parts that two windows share."""
     first, second = (structure(window, settings) for window in (both.reference, both.input))
     surface = phase_surface(first, second, wrap=True)
     peaks = surface.peaks(np.eye(2), CORRECTION_PX, 1)
@@ -180,11 +180,11 @@ def phase_correlation(
     reference, input
         The windows.
     limits
-        Only shifts are searched for; the scale is the one nearest to 1 within the limits.
+        Only the shift is searched; the scale is the one nearest to 1 within the limits.
     settings
-        "ncc" compares grey values, all else orientation fields.
+        "ncc" compares grey values, any other similarity orientation fields.
     context
-        Threads to align the candidates in.
+        Provides threads to align the candidates.
     """
     if reference.is_flat or input.is_flat:
         return []

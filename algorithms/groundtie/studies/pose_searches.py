@@ -1,4 +1,4 @@
-"""All searches for a pose, by the names that users choose them by to compare them."""
+"""All pose searches, by the names under which users compare them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ DEFAULT_SEARCH = "rotation-steps"
 
 
 class PoseSearch(Protocol):
-    """A way to find the pose of an input window in a reference window, as `find_poses` does.
+    """A search for the pose of an input window in a reference window, as `find_poses` does.
 
     Parameters
     ----------
     settings
-        Similarity of the searches that climb a joint histogram.
+        Similarity of the searches that climb a joint-histogram measure.
     """
 
     def __call__(
@@ -48,7 +48,7 @@ def rotation_steps(
     settings: SimilaritySettings,
     context: Context,
 ) -> list[PoseFound]:
-    """Search as registrations do, by orientation fields whatever the similarity."""
+    """Search as registrations do: by orientation fields, whatever the similarity."""
     return find_poses(reference, input, limits, context)
 
 
@@ -66,7 +66,8 @@ SEARCHES = MappingProxyType[str, PoseSearch](
     }
 )
 
-# Those that climb a joint histogram; all others correlate orientation fields or grey values.
+# Searches that climb a joint-histogram measure; the others correlate orientation fields or grey
+# values.
 HISTOGRAM_SEARCHES = frozenset(
     name for name, search in SEARCHES.items() if isinstance(search, ClimbingSearch)
 )

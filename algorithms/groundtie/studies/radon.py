@@ -1,11 +1,11 @@
-"""Radon: rotation and shift from projections of the windows.
+"""Radon transform: rotation and shift from projections of the windows.
 
-A rotation is a shift of the Radon transform along its angle; the spectra of the projections do
-not change with the image's shift, so the rotation is found on them. The shift is then that of the
-projections onto the rows' and columns' directions (equations 3.10–3.12). The source's errors are
-up to 2° and a few pixels; here the spectra are normalised at each frequency, peaks are found
-between the bins, and all is found again on what both windows show. Source: [Patel2017], sections
-3.3.2–3.3.4.
+A rotation shifts the Radon transform along its angle axis. The magnitude spectra of the projections
+do not depend on the image's shift, so the rotation is found on them. The shift is then found on the
+projections onto the row and column directions (equations 3.10–3.12). The source reports errors of
+up to 2° and a few pixels. This implementation normalises the spectra at each frequency, finds peaks
+between the bins, and repeats the search on the part that both windows show. Source: [Patel2017],
+sections 3.3.2–3.3.4.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ _SIDE_PX = 192
 # Frequencies of the projections that are compared, in cycles per pixel.
 _RANGE = (0.02, 0.4)
 
-# Detail of the angles' correlation that is kept: standard deviation, in cycles per bin.
+# Low-pass filter of the correlation over angles: standard deviation, in cycles per bin.
 _ANGLE_BAND = 0.15
 
-# How many rotations are tried, and which bins of the angle are the same peak.
+# Number of rotations that are tried, and the angle bins that count as one peak.
 CANDIDATES = 5
 _SAME = np.ones(2 * round(SAME_DEG / ANGLE_STEP_DEG) + 1, bool)
 
-# How far the rotation is corrected on what both windows show.
+# Limits for correcting the rotation on the part that both windows show.
 _CORRECTION = SearchLimits(0.0, 2.0)
 
 
@@ -75,12 +75,13 @@ def radon_transform(image: Image) -> Image:
     Parameters
     ----------
     image
-        Shape (h, w); the sum of what lies within the disc of diameter n, the longer side.
+        Shape (h, w). Projections cover a square of side n, the longer side, that rotates with the
+        angle about the centre.
 
     Returns
     -------
-    Row k holds the sums along lines whose distances from the centre grow in the direction that
-    lies k steps of `ANGLE_STEP_DEG` clockwise from straight up.
+    Row k holds sums along parallel lines. Their distance from the centre grows in the direction
+    that is k steps of `ANGLE_STEP_DEG` clockwise from straight up.
     """
     side = max(image.shape)
     size = (side, side)
@@ -90,7 +91,7 @@ def radon_transform(image: Image) -> Image:
         angle = np.pi * step / ANGLES
         along = np.array([np.sin(angle), -np.cos(angle)])
         across = np.array([np.cos(angle), np.sin(angle)])
-        # Rows of the rotated image are the lines: it runs along them by columns.
+        # Each row of the rotated image is one projection line.
         matrix = np.column_stack([across, along, np.zeros(2)])
         matrix[:, 2] = to_middle - matrix[:, :2] @ np.full(2, (side - 1) / 2)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -124,11 +125,11 @@ def rotations(spectra: list[Image], limits: SearchLimits, count: int) -> Iterato
     spectra
         The log power of the reference's and the input's projections.
     limits
-        Within which rotations lie; the poses' scale is the one nearest to 1.
+        Limits of the rotation; the poses' scale is the one within limits that is nearest to 1.
     count
-        How many are wanted, not counting half turns.
+        Number of rotations, not counting half turns.
     """
-    # As with Fourier–Mellin, the reference further on along the angle is the input.
+    # As in Fourier–Mellin, the reference's spectrum at a larger angle matches the input's.
     first, second = (scipy.fft.fft(spectrum, axis=0) for spectrum in spectra)
     values = correlation((first * second.conj()).sum(axis=1), _ANGLE_BAND, WHITENING)
     rotation = (np.arange(ANGLES) - ANGLES // 2) * ANGLE_STEP_DEG
@@ -144,16 +145,16 @@ def rotations(spectra: list[Image], limits: SearchLimits, count: int) -> Iterato
 def shift_along(
     reference: NDArray, input: NDArray, reach_px: float, wrap: bool = False
 ) -> tuple[float, float]:
-    """Return by how much a projection is shifted against another, and the peak's robust height.
+    """Return the shift of one projection relative to another, and the peak's robust height.
 
     Parameters
     ----------
     reference, input
-        Real or complex, shapes (m,) and (n,); their centres are compared.
+        Real or complex, shapes (m,) and (n,); the shift is that between their centres.
     reach_px
         Largest shift.
     wrap
-        Whether shifts are known to be small: projections of one length are then not padded.
+        Whether shifts are known to be small; projections of equal length are then not padded.
     """
     sizes = len(reference), len(input)
     count = scipy.fft.next_fast_len(max(sizes) if wrap else sum(sizes))
@@ -167,7 +168,7 @@ def shift_along(
 def shift_by_projections(
     reference: Image | Field, input: Image | Field, reach_px: float, wrap: bool = False
 ) -> PoseFound:
-    """Return the shift of an image by its projections at 0° and 90°.
+    """Return the shift of an image, estimated from its projections at 0° and 90°.
 
     Source: [Patel2017], equations 3.11 and 3.12.
     """
@@ -190,13 +191,13 @@ def radon(
     reference, input
         The windows.
     limits
-        Within which rotation and shift are searched for; the scale is not: it is the one nearest
-        to 1 within the limits.
+        Limits of rotation and shift. The scale is not searched: it is the one nearest to 1 within
+        the limits.
     settings
-        "ncc" compares grey values; all else finds the rotation on their logarithms, and the
-        shift on orientation fields.
+        "ncc" compares grey values; any other similarity finds the rotation on their logarithms
+        and the shift on orientation fields.
     context
-        Threads to align the candidates in.
+        Provides threads to align the candidates.
     """
     scale = float(np.clip(1.0, *limits.scale))
     if scale != 1:
@@ -238,13 +239,13 @@ def _shifted(
 
 
 def remaining_shift(both: Shared, settings: SimilaritySettings) -> PoseFound:
-    """Return the shift that is left between the parts that two windows share."""
+    """Return the residual shift between the parts that two windows share."""
     first, second = (structure(window, settings) for window in (both.reference, both.input))
     return shift_by_projections(first, second, CORRECTION_PX, wrap=True)
 
 
 def remaining_pose(both: Shared, settings: SimilaritySettings) -> PoseFound:
-    """Return what rotation and shift are left between the parts that two windows share."""
+    """Return the residual rotation and shift between the parts that two windows share."""
     spectra = projection_spectra(both.reference, both.input, settings, disc=False)
     rotation = next(rotations(spectra, _CORRECTION, 1), Pose())
     shift = remaining_shift(both, settings)

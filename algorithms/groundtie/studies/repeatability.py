@@ -1,7 +1,7 @@
-"""How well a detector finds the same features in two registered images ([Suri2010] 6.6.2).
+"""Repeatability of a detector's features in two registered images ([Suri2010] 6.6.2).
 
-[Mikolajczyk2005]: features are circles as large as their scale; two correspond if their
-circles overlap enough, after both were scaled so that the first's radius is 30 pixels.
+As in [Mikolajczyk2005], features are circles whose radii are their scales. Two features correspond
+if their circles overlap enough, after both are scaled so that the first's radius is 30 pixels.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..features.keypoints import Keypoints
 from ..rasters.grid import FloatArray
 
-# Overlap errors up to these limits make the classes; the last one is all above.
+# Upper limits of the classes of overlap errors; the last class holds all larger errors.
 CLASS_LIMITS = (0.1, 0.2, 0.3, 0.4)
 CLASS_NAMES = ("0–10 %", "10–20 %", "20–30 %", "30–40 %", "> 40 %")
 
@@ -26,11 +26,11 @@ def overlap_error(first: Keypoints, second: Keypoints) -> FloatArray:
     Parameters
     ----------
     first, second
-        n features each, in the pixels of the first image. Circles are scaled together until the
-        first has a radius of 30 pixels.
+        n features each, in the pixels of the first image. Both circles of a pair are scaled alike,
+        so that the first has a radius of 30 pixels.
     """
     grow = _RADIUS_PX / first.scale_px
-    # Positions keep their distance: only the regions are normalised, as in [Mikolajczyk2005].
+    # The distance of the centres is not scaled: [Mikolajczyk2005] normalises only the regions.
     apart = np.hypot(*(second.position_px - first.position_px).T)
     a, b = np.full(len(first), _RADIUS_PX), second.scale_px * grow
     shared = _lens(a, b, apart)
@@ -38,7 +38,7 @@ def overlap_error(first: Keypoints, second: Keypoints) -> FloatArray:
 
 
 def _lens(a: FloatArray, b: FloatArray, apart: FloatArray) -> FloatArray:
-    """Return the area that circles of radii a and b share, their centres `apart`."""
+    """Return the intersection area of circles of radii a and b whose centres are `apart`."""
     inside = np.pi * np.minimum(a, b) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         at_a = np.arccos(np.clip((apart**2 + a**2 - b**2) / (2 * apart * a), -1, 1))
@@ -49,15 +49,15 @@ def _lens(a: FloatArray, b: FloatArray, apart: FloatArray) -> FloatArray:
 
 
 def classes(errors: FloatArray) -> NDArray[np.int_]:
-    """Return how many overlap errors fall into each of `CLASS_NAMES`, shape (5,)."""
+    """Return the number of overlap errors in each of `CLASS_NAMES`, shape (5,)."""
     return np.bincount(np.searchsorted(CLASS_LIMITS, errors), minlength=len(CLASS_NAMES))
 
 
 def repeatability(first: Keypoints, second: Keypoints) -> FloatArray:
-    """Return which share of features correspond, each at most once, by class of overlap error.
+    """Return the share of features that correspond one to one, by class of overlap error.
 
-    Pairs are made from the smallest overlap error to the largest; features that are left, or
-    overlap by less than the largest class limit allows, count as the last class.
+    Pairs are formed from the smallest overlap error to the largest. The last class counts the
+    features without a partner within the largest class limit.
 
     Parameters
     ----------
@@ -66,12 +66,12 @@ def repeatability(first: Keypoints, second: Keypoints) -> FloatArray:
 
     Returns
     -------
-    Correspondences in each of `CLASS_NAMES` over the features of the smaller set, shape (5,).
+    Correspondences in each of `CLASS_NAMES` over the size of the smaller set, shape (5,).
     """
     possible = min(len(first), len(second))
     if possible == 0:
         return np.zeros(len(CLASS_NAMES))
-    # Circles whose centres are a radius apart overlap by less than any limit allows.
+    # Circles whose centres are a radius apart have overlap errors above all class limits.
     pairs = cKDTree(first.position_px).query_ball_tree(cKDTree(second.position_px), _RADIUS_PX)
     one = np.repeat(np.arange(len(first)), [len(p) for p in pairs])
     other = np.concatenate([np.asarray(p, int) for p in pairs])

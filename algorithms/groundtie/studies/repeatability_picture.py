@@ -1,4 +1,4 @@
-"""The picture of what `detector_repeatability` measured, as [Suri2010] figures 6.9–6.14."""
+"""The picture of the results of `detector_repeatability`, as [Suri2010] figures 6.9–6.14."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..rasters.atomic import writing
 from .evaluation import Evaluation
 from .repeatability import CLASS_NAMES
 
-# Of the classes' width, what the bars of all variants share.
+# Share of a class's width that the bars of all variants fill.
 _WIDTH = 0.8
 
 

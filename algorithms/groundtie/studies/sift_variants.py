@@ -1,4 +1,4 @@
-"""SIFT with other octaves, smoothing, gradients and orientations ([Suri2010] 6.3, 6.4)."""
+"""SIFT with different octaves, smoothing, gradients and orientations ([Suri2010] 6.3, 6.4)."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..speckle.isef import isef
 from .gradients import DECAY, GRADIENTS, gradient_operator, needs_positive
 from .orientation import describe_at_scales
 
-# Least contrast of the comparison of detectors. Without speckle's octave keypoints are weaker, and
-# inliers among them.
+# Least contrast for the comparison of detectors. Without the octave that speckle dominates,
+# keypoints are weaker, and the inliers among them, too.
 _CONTRAST = {"sift": 0.04, "sift-oct": 0.075, "sift-isef-oct": 0.04}
 DETECTORS = tuple(_CONTRAST)
 
-# Amplitude in nepers, of which decibels are so many.
+# Nepers of amplitude per decibel.
 _NEPER_PER_DB = np.log(10) / 20
 
 
 def sift_detector(name: str, contrast: float | None = None) -> SiftDetector:
-    """Return the detector of a name of `DETECTORS`; by default with the contrast that fits it.
+    """Return the detector for a name in `DETECTORS`, by default with its own least contrast.
 
-    "sift"; "sift-oct", without the first octave; "sift-isef-oct", the same on an image that was
-    smoothed by the infinite symmetric exponential filter.
+    "sift" is the standard detector. "sift-oct" omits the first octave. "sift-isef-oct" does so on
+    an image that was smoothed by the infinite symmetric exponential filter.
     """
     least = _CONTRAST[name] if contrast is None else contrast
     if name == "sift":
@@ -49,15 +49,15 @@ class SiftIsefOctDetector(SiftOctDetector):
 
 @dataclass(frozen=True)
 class SiftVariantDescriptor:
-    """SIFT's descriptor by any gradient, upright or oriented.
+    """SIFT descriptor with any gradient, upright or oriented.
 
     Parameters
     ----------
     gradient
         One of `gradients.GRADIENTS`.
     upright
-        Whether keypoints keep the image's axes; else each is rotated by its own orientation, and
-        one with several is repeated.
+        Whether keypoints keep the image's axes; otherwise each is rotated by its own orientation,
+        and a keypoint with several orientations is repeated.
     """
 
     gradient: str = GRADIENTS[0]
@@ -74,6 +74,6 @@ class SiftVariantDescriptor:
     def describe_image(
         self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
     ) -> tuple[Keypoints, FloatImage]:
-        """Describe keypoints of an image whose grey values are taken as they are."""
+        """Describe keypoints of an image, without compressing its grey values."""
         operator = gradient_operator(self.gradient)
         return describe_at_scales(image, valid, found, sift_rows, LENGTH, self.upright, operator)

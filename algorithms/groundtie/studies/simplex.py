@@ -1,4 +1,4 @@
-"""Powell's and Nelder and Mead's ways to climb, which need no gradient (scipy).
+"""Gradient-free climbing by the methods of Powell and of Nelder and Mead (scipy).
 
 Sources: [Powell1964], [Nelder1965].
 """
@@ -15,17 +15,17 @@ from .climbing import PEAK_PX, PRECISION_PX, ClimbingSearch, Place, PoseSpace, S
 
 POWELL, NELDER_MEAD = "Powell", "Nelder-Mead"
 
-# How exact similarities are wanted: NMI changes by some thousandths.
+# Required precision of the similarity: NMI changes by some thousandths.
 _SIMILARITY = 1e-6
 
-# A climb ends after so many evaluations.
+# Largest number of evaluations in a climb.
 _LONGEST = 400
 
 
 def climb(
     similarity: Similarity, space: PoseSpace, start: Place, rng: np.random.Generator, method: str
 ) -> Place:
-    """Return the best place found from a start by a method of scipy; nothing is drawn."""
+    """Return the best place found from a start by a method of scipy, which uses no randomness."""
     options: dict[str, Any] = {"maxfev": _LONGEST}
     if method == POWELL:
         options |= {"xtol": PRECISION_PX, "ftol": _SIMILARITY}
@@ -46,11 +46,11 @@ def climb(
 
 
 def _simplex(space: PoseSpace, start: Place) -> list[Place]:
-    """Return the start and a place a peak's width away in each dimension, towards the far limit."""
+    """Return the start, and one place per dimension a peak's width towards the farther limit."""
     towards = np.where(space.bounds.mean(axis=1) < start, -PEAK_PX, PEAK_PX)
     return [start, *(space.settle(start + side) for side in np.diag(towards))]
 
 
-# Along one direction after the other; and by a simplex that moves, grows and shrinks.
+# Powell climbs along one direction after the other, Nelder–Mead by a simplex that adapts.
 powell = ClimbingSearch(partial(climb, method=POWELL))
 nelder_mead = ClimbingSearch(partial(climb, method=NELDER_MEAD))

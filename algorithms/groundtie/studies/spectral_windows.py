@@ -1,6 +1,6 @@
-"""Windows as spectra need them: apodised, resampled by a pose, cut to what they share.
+"""Prepare windows for spectral methods: apodise, resample by a pose, crop to the shared part.
 
-What the constants of these methods come to, `benchmarks/run.py --only rotation` measures.
+`benchmarks/run.py --only rotation` measures the effect of the constants of these methods.
 """
 
 from __future__ import annotations
@@ -25,31 +25,31 @@ Image = NDArray[np.float32]
 Field = NDArray[np.complex64]
 AnyImage = TypeVar("AnyImage", Image, Field)
 
-# Images fade out towards their borders and masked pixels over this share of their shorter side.
+# Images are tapered towards their borders and masked pixels over this share of their shorter side.
 _FADING_SHARE = 0.15
 
-# Poses nearer to one another than all of these are the same.
+# Two poses are the same if they differ by less than all of these limits.
 SAME_DEG = 3.0
 SAME_LOG_SCALE = 0.05
 SAME_PX = 6.0
 
-# How many candidates are aligned and returned at most, and which share of the best one's height
-# they have at least.
+# Largest number of candidates that are aligned and returned, and their least height as a share of
+# the best one's height.
 RETURNED = 2
 WORTH_ALIGNING = 0.5
 
-# Resampled pixels are valid if the weights of valid pixels sum up to this.
+# A resampled pixel is valid if the weights of valid pixels sum to more than this.
 _ALL_VALID = 0.999
 
-# Windows that share less than this of the reference's pixels are not compared.
+# Windows that share less than this part of the reference's pixels are not compared.
 MINIMUM_SHARED = 0.05
 
 
 def texture(window: Patch, settings: SimilaritySettings) -> Image:
-    """Return what spectra are made of: grey values for "ncc", else their logarithm.
+    """Return the image for spectra: grey values for "ncc", otherwise their logarithm.
 
-    The logarithm makes a SAR image's speckle additive and keeps its brightest points from
-    drowning all else.
+    The logarithm makes the speckle of a SAR image additive and keeps its brightest points from
+    dominating the spectrum.
     """
     if settings.similarity != "ncc":
         return compress(window)
@@ -61,9 +61,9 @@ def _mean(window: Patch) -> np.float32:
 
 
 def structure(window: Patch, settings: SimilaritySettings) -> Image | Field:
-    """Return what is correlated, apodised: grey values for "ncc", else the orientation field.
+    """Return the apodised image to correlate: grey values for "ncc", else the orientation field.
 
-    The field (see `orientation`) is what a SAR and an optical image have in common.
+    SAR and optical images have the orientation field (see `orientation`) in common.
     """
     image = texture(window, settings)
     if settings.similarity == "ncc":
@@ -72,14 +72,14 @@ def structure(window: Patch, settings: SimilaritySettings) -> Image | Field:
 
 
 def apodise(image: AnyImage, valid: NDArray[np.bool_], disc: bool = False) -> AnyImage:
-    """Return an image without its mean, faded out towards its borders and masked pixels.
+    """Return an image without its mean, tapered towards its borders and masked pixels.
 
     Parameters
     ----------
     image, valid
-        Grey values, or a complex field, and which of them count, shape (h, w).
+        Grey values or a complex field, and the mask of valid pixels, shape (h, w).
     disc
-        Whether only the disc inside the borders is kept, which a rotation does not change.
+        Whether to keep only the disc inside the borders, whose outline is rotation-invariant.
     """
     weights = _fading(valid)
     if disc:
@@ -106,16 +106,16 @@ def _raised_cosine(share: NDArray[np.floating]) -> Image:
 
 
 def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> Patch:
-    """Return the input as it would lie in the reference: rotated, scaled and shifted back.
+    """Return the input resampled into the reference: rotated, scaled and shifted back.
 
     Parameters
     ----------
     input
         The window.
     pose
-        How it lies against the reference.
+        Pose of the input relative to the reference.
     shape
-        Rows and columns of the result, whose centre is the reference's.
+        Rows and columns of the result, which is centred on the reference.
     kernel
         "bilinear" or "cubic".
     """
@@ -125,7 +125,7 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
     fill = _mean(input)
     values = np.where(input.valid, input.values - fill, np.float32(0))
     if pose.scale > 1:
-        # The input is finer: what the result's pixels cannot show is smoothed away.
+        # The input is finer: smooth away the detail that the result's pixels cannot resolve.
         values[...] = cv2.GaussianBlur(values, (0, 0), 0.5 * np.sqrt(pose.scale**2 - 1) + 1e-3)
     valid = interpolate(input.valid.astype(np.float32), px, "bilinear") > _ALL_VALID
     return Patch(interpolate(values, px, kernel) + fill, valid)
@@ -134,9 +134,9 @@ def resampled(input: Patch, pose: Pose, shape: tuple[int, int], kernel: str) -> 
 def covering_shape(
     input: tuple[int, int], pose: Pose, reference: tuple[int, int]
 ) -> tuple[int, int]:
-    """Return rows and columns that hold all of an input of a shape, resampled by a pose.
+    """Return the rows and columns that hold a whole input, given by its shape, resampled by a pose.
 
-    They are even or odd as the reference's are, so that pixels fall on one another.
+    Their parity is that of the reference, so that the pixels of both coincide.
     """
     inverse = np.abs(np.linalg.inv(pose.linear))
     width, height = np.ceil(inverse @ [input[1], input[0]]).astype(int)
@@ -148,14 +148,14 @@ def covering_shape(
 
 @dataclass(frozen=True)
 class Shared:
-    """What reference and resampled input both show.
+    """The part of the ground that both the reference and the resampled input show.
 
     Parameters
     ----------
     reference, input
-        Windows of one shape, in the reference's pixels; both have the same valid pixels.
+        Windows of one shape, in reference pixels; both have the same valid pixels.
     offset_px
-        How far (right, down) their centre lies from the reference's.
+        Offset (right, down) of their centre from the centre of the reference.
     """
 
     reference: Patch
@@ -164,7 +164,7 @@ class Shared:
 
 
 def shared(reference: Patch, input: Patch, pose: Pose) -> Shared | None:
-    """Return what a reference and an input at a pose both show, None if it is too little."""
+    """Return the part that a reference and an input at a pose share; None if it is too small."""
     shape = (reference.values.shape[0], reference.values.shape[1])
     back = resampled(input, pose, shape, "cubic")
     both = reference.valid & back.valid
@@ -185,10 +185,10 @@ def aligned(
     settings: SimilaritySettings,
     *remaining: Callable[[Shared, SimilaritySettings], PoseFound | None],
 ) -> PoseFound:
-    """Return a candidate corrected by what is left between the parts that both windows show.
+    """Return a candidate corrected by the residual pose between the parts both windows show.
 
-    Cut to one shape and faded out alike, they no longer differ at their borders, which would
-    draw an estimate towards no shift.
+    Cropped to one shape and tapered alike, the parts no longer differ at their borders, where
+    differences would bias an estimate towards zero shift.
 
     Parameters
     ----------
@@ -197,12 +197,12 @@ def aligned(
     found
         The candidate.
     limits
-        Within which the result stays.
+        Limits of the result.
     settings
         How similarity is measured.
     remaining
-        Each corrects what those before have left: returns the pose of one part against the
-        other, None if it has none.
+        Corrections that are applied in turn. Each returns the pose of the input's part relative
+        to the reference's; None if it finds none.
     """
     for correct in remaining:
         both = shared(reference, input, found.pose)
@@ -214,16 +214,16 @@ def aligned(
 
 
 def corrected(pose: Pose, correction: Pose, offset_px: FloatArray) -> Pose:
-    """Return the pose that first corrects in the reference, about a place, then applies `pose`.
+    """Return the pose that first corrects in the reference, about a centre, then applies `pose`.
 
     Parameters
     ----------
     pose
-        As it was.
+        The uncorrected pose.
     correction
-        What is left between the reference and the input resampled by `pose`.
+        Residual pose between the reference and the input resampled by `pose`.
     offset_px
-        Where from the reference's centre the correction's own centre lies, (right, down).
+        Offset (right, down) of the correction's centre from the centre of the reference.
     """
     shift = offset_px + correction.shift_px - correction.linear @ offset_px
     right, down = pose.shift_px + pose.linear @ shift
@@ -232,7 +232,7 @@ def corrected(pose: Pose, correction: Pose, offset_px: FloatArray) -> Pose:
 
 
 def within(pose: Pose, limits: SearchLimits) -> Pose:
-    """Return the pose nearest to a pose within limits."""
+    """Return a pose clipped to limits."""
     right, down = np.clip(pose.shift_px, -limits.radius, limits.radius)
     return Pose(
         float(np.clip(pose.rotation_deg, -limits.rotation_deg, limits.rotation_deg)),
@@ -242,7 +242,7 @@ def within(pose: Pose, limits: SearchLimits) -> Pose:
 
 
 def distinct(found: Iterable[PoseFound], least_share: float = 0.0) -> list[PoseFound]:
-    """Return candidates, best first, without those that a better one stands for.
+    """Return candidates, best first, without those at the same pose as a better one.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Simultaneous perturbation stochastic approximation (SPSA): climbing with two looks a step.
 
-How steep the similarity is is not known beforehand; NMI changes by some thousandths. So slopes are
-divided by their own root mean square so far, and gains are pixels. Source: [Spall1992],
-[Spall1998], [Suri2010] eq 4.1–4.4; second order: [Spall2000], for registration [ColeRhodes2003];
-discrete: [Suri2010] 4.4.2.
+A look is one evaluation of the similarity. The steepness of the similarity is not known beforehand;
+NMI changes by some thousandths. Slopes are therefore divided by their running root mean square, so
+that gains are in pixels. Source: [Spall1992], [Spall1998], [Suri2010] eq 4.1–4.4; second order:
+[Spall2000], for registration [ColeRhodes2003]; discrete: [Suri2010] 4.4.2.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from .climbing import PRECISION_PX, ClimbingSearch, Effort, Place, PoseSpace, Si
 
 Measure = Callable[[FloatArray], float]
 
-# Spall's exponents: the least that still converge.
+# Spall's exponents: the smallest values that still converge.
 ALPHA, GAMMA = 0.602, 0.101
 
-# A climb ends after so many evaluations without a change: without more than what the usual slope
-# rises in `PRECISION_PX` ([Suri2010], section 4.4.1).
+# A climb ends after this many evaluations without progress: without a gain of more than the rise
+# of the usual slope over `PRECISION_PX` ([Suri2010], section 4.4.1).
 PATIENCE = 40
 
 
 @dataclass(frozen=True)
 class Gains:
-    """How far SPSA steps and looks: a_k = a ((1 + A) / (k + 1 + A))^α and c_k = c / (k + 1)^γ.
+    """SPSA's step and look lengths: a_k = a ((1 + A) / (k + 1 + A))^α and c_k = c / (k + 1)^γ.
 
     Parameters
     ----------
     step_px
         a: the first step on a slope of the usual steepness.
     look_px
-        c: how far from the place the first two looks are, in every dimension.
+        c: offset of the first two looks from the place, in every dimension.
     steady
-        A: for about so many steps their length hardly falls.
+        A: approximate number of steps over which the step length hardly decreases.
     """
 
     step_px: float = 3.0
@@ -58,7 +58,7 @@ CONTINUOUS = Gains(look_px=1.0)
 
 
 class _Slopes:
-    """Estimates so far: the slopes' root mean square, and for second order the Hessian."""
+    """Running estimates: the slopes' root mean square, and for second order the Hessian."""
 
     def __init__(self, dimensions: int) -> None:
         self.steps = 0
@@ -77,9 +77,9 @@ class _Slopes:
         return float(np.sqrt(self._squares / max(self.steps, 1)))
 
     def newton(self, gradient: FloatArray, step_px: float) -> FloatArray:
-        """Return the uphill step of second order; where nothing is curved, that of first order.
+        """Return the second-order uphill step; without curvature, it is the first-order step.
 
-        Eigenvalues of the Hessian are taken by their size, so that saddles are left uphill, too.
+        Eigenvalues of the Hessian count by magnitude, so that steps leave saddles uphill, too.
         """
         values, vectors = np.linalg.eigh(self._hessian)
         curvature = np.hypot(values, self.usual / step_px)
@@ -92,7 +92,7 @@ def climb_first_order(
     """Return the best place found from a start by SPSA of first order.
 
     In a space of aligned grids (`PoseSpace.origin`) this is discrete SPSA: looks and steps are
-    rounded to whole pixels ([Suri2010], section 4.4.2).
+    rounded stochastically to whole pixels ([Suri2010], section 4.4.2).
     """
 
     def uphill(look: Measure, at: FloatArray, slopes: _Slopes) -> FloatArray:
@@ -134,15 +134,15 @@ def _climb(
     rng: np.random.Generator,
     uphill: Callable[[Measure, FloatArray, _Slopes], FloatArray],
 ) -> Place:
-    """Step uphill until `PATIENCE` evaluations have changed the best value by next to nothing."""
+    """Step uphill until `PATIENCE` evaluations in a row bring no noticeable improvement."""
     best, mark, waited = start, similarity(start), 0
     slopes = _Slopes(len(start))
 
     def settle(values: FloatArray) -> Place:
         if space.origin is None:
             return space.settle(values)
-        # Up or down by chance: steps are as long in all dimensions, and plain rounding would
-        # never leave the squares of one colour of the chessboard.
+        # Round up or down at random: steps are equally long in all dimensions, so that plain
+        # rounding would only reach the places of one colour of a chessboard.
         return space.settle(values + rng.uniform(-0.5, 0.5, values.size))
 
     def look(values: FloatArray) -> float:

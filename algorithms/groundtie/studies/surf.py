@@ -1,6 +1,6 @@
-"""SURF's keypoints ([Bay2008]; [Patel2017] 4.2): blobs, by the Hessian of box filters.
+"""SURF keypoints ([Bay2008]; [Patel2017] 4.2): blobs, found by the Hessian of box filters.
 
-SURF's authors held patents, which may still run in some countries.
+SURF's authors held patents, which may still be in force in some countries.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from ..rasters.patch import Patch
 from ..similarity.orientation import compress
 from .box_hessian import FloatImage, determinants, integral_image, sigma_of
 
-# How often the size of blobs is doubled ([Bay2008] 3.2).
+# Number of octaves of blob size ([Bay2008] 3.2).
 _OCTAVES = 3
 
 
 @dataclass(frozen=True)
 class SurfDetector:
-    """Finds blobs of an image and their sizes.
+    """Detects blobs in an image, with their sizes.
 
     Parameters
     ----------
     threshold
-        Least determinant of the Hessian of a feature, on grey values from 0 to 1 ([Patel2017]:
-        0.0005 to 0.002).
+        Least determinant of a feature's Hessian, for grey values from 0 to 1 ([Patel2017]: 0.0005
+        to 0.002).
     """
 
     threshold: float = 0.0004
@@ -43,9 +43,9 @@ class SurfDetector:
         Parameters
         ----------
         window
-            The image; features that see masked pixels are left out.
+            The image; features whose support includes masked pixels are left out.
         context
-            Threads to work in; None: this one.
+            Provides threads; None: the current one only.
         """
         if window.is_flat:
             return Keypoints.none()
@@ -71,7 +71,7 @@ class SurfDetector:
 def octave_sides(octave: int) -> tuple[int, ...]:
     """Return the sides of an octave's four filters: 9, 15, 21, 27, then 15, 27, 39, 51 and so on.
 
-    Features lie between the first and the last; octaves overlap.
+    The sizes of features lie between those of the first and the last filter; octaves overlap.
     """
     spacing = 6 * 2**octave
     first = 3 + spacing
@@ -81,7 +81,7 @@ def octave_sides(octave: int) -> tuple[int, ...]:
 def _peaks(
     layers: list[FloatImage], sides: tuple[int, ...], middle: int, octave: int, threshold: float
 ) -> Keypoints:
-    """Return the peaks of the middle one of three layers, among their neighbours in all three."""
+    """Return the peaks of the middle of three layers: maxima over neighbours in all three."""
     around = np.ones((3, 3), np.uint8)
     highest = np.maximum.reduce([cv2.dilate(layer, around) for layer in layers])
     at = (layers[1] > threshold) & (layers[1] >= highest)
@@ -89,7 +89,7 @@ def _peaks(
     inside = (rows > 0) & (cols > 0) & (rows < at.shape[0] - 1) & (cols < at.shape[1] - 1)
     rows, cols = rows[inside], cols[inside]
     offset, height = _vertices(layers, rows, cols)
-    # Further than a step from its lattice position, a peak belongs to another one or none.
+    # A vertex a step or more from its lattice position belongs to another position, or to none.
     near = np.abs(offset).max(axis=1, initial=0.0) < 1
     offset, height, rows, cols = offset[near], height[near], rows[near], cols[near]
     position = 2**octave * (np.column_stack([cols, rows]) + offset[:, :2])
@@ -100,9 +100,9 @@ def _peaks(
 def _vertices(
     layers: list[FloatImage], rows: NDArray[np.intp], cols: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where parabolas through peaks and their neighbours are highest, and how high.
+    """Return the offsets and heights of the vertices of quadratics fitted to peaks ([Brown2002]).
 
-    The offsets are along columns, rows and layers, shape (n, 3) ([Brown2002]).
+    The offsets are along columns, rows and layers, shape (n, 3).
     """
 
     def value(x: int, y: int, z: int) -> FloatArray:
@@ -123,7 +123,7 @@ def _vertices(
 
 
 def _solved(matrices: FloatArray, sides: FloatArray) -> FloatArray:
-    """Return the solutions of linear systems, infinite where there is none."""
+    """Return the solutions of linear systems; infinite for singular systems."""
     good = np.abs(np.linalg.det(matrices)) > 0
     solution = np.full(sides.shape, np.inf)
     solution[good] = np.linalg.solve(matrices[good], sides[good][..., None])[..., 0]

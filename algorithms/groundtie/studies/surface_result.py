@@ -1,4 +1,4 @@
-"""What a study of one window's similarity found, and the files it is written to."""
+"""The result of a study of one window's similarity, and its output files."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ class SurfaceResult:
     similarity
         The measure.
     values
-        Its values over shifts, shape (2 r + 1, 2 r + 1), centre shift 0; NaN where too little
-        overlaps. For fused, which has no values of its own, the deviations.
+        Values of the measure over shifts, shape (2 r + 1, 2 r + 1), shift 0 at the centre; NaN
+        where the overlap is too small. For fused, which has no values of its own, the deviations.
     deviations
-        The surface in robust standard deviations, without its slow trend; in it peaks are found.
+        The detrended surface in robust standard deviations, in which peaks are found.
     grid
-        Where the surface's pixels lie: that of a shift lies where the window's centre, so
-        shifted, lies.
+        Georeferencing of the surface: the pixel of a shift lies at the window's centre moved by
+        that shift.
     peak, second
-        The highest peak, and the highest one elsewhere; None if there is none.
+        The highest peak, and the highest separate peak; None if there is none.
     chip_px
         Side of the window.
     files
-        What was written, by name.
+        Paths of the output files, by name.
     """
 
     similarity: str
@@ -89,11 +89,11 @@ class SurfaceResult:
 
     @property
     def second_ratio(self) -> float | None:
-        """Height of the second peak as a share of the first's; None without a second."""
+        """Height of the second peak as a share of the first's; None without a second peak."""
         return None if self.second is None else self.second.height / self.peak.height
 
     def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
+        """Return the result as JSON-compatible values."""
         x, y = self.grid.pixel_to_map([self.grid.centre_px])[0]
         return {
             "similarity": self.similarity,
@@ -158,7 +158,7 @@ def _draw(path: Path, result: SurfaceResult) -> None:
     axes.plot(*result.peak.shift_px, "o", mfc="none", mec="red", ms=14, mew=1.8, label="peak")
     if result.second is not None:
         axes.plot(*result.second.shift_px, "s", mfc="none", mec="white", ms=10, label="second peak")
-    # Rows run downwards, as on the map.
+    # Rows increase downwards, as on the map.
     axes.set(xlabel="to the right (px)", ylabel="downwards (px)")
     axes.legend(loc="upper right", framealpha=0.7)
     right, down = result.peak.shift_px

@@ -1,4 +1,4 @@
-"""The similarity surface of one window of a pair, for any measure, and its second peak."""
+"""The similarity surface of one window of an image pair, for any measure, and its second peak."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ CHOICES = tuple(dict.fromkeys((*SIMILARITIES, *HISTOGRAM_MEASURES, _MLMI)))
 
 DEFAULT_RADIUS_PX, LARGEST_RADIUS_PX = 20, 100
 
-# A second peak lies further away from the first than this along columns or rows.
+# Least distance of the second peak from the first along columns or rows, exclusive.
 _PEAK_PX = 2
 
 
 @dataclass(frozen=True)
 class Window:
-    """Where and how a surface is made.
+    """Position and size of the window that a surface is measured for.
 
     Parameters
     ----------
@@ -87,21 +87,21 @@ class Window:
             if not pair.grid.contains(px):
                 raise NoOverlapError(f"the centre {x:.15g}, {y:.15g} does not lie in the overlap")
         col, row = np.floor(px + 0.5).astype(int)
-        # Even numbers get one more, so that there is a centre.
+        # Even sizes are increased by one, so that the window has a central pixel.
         return cls(pair, (int(col), int(row)), chip_px | 1, _radius_px(pair.grid, radius_m))
 
     def grid(self, reach_px: int) -> Grid:
-        """Return the piece of the matching grid around the centre, 2 reach + 1 pixels a side."""
+        """Return the part of the matching grid around the centre, 2 reach + 1 pixels a side."""
         col, row = self.centre_px
         return self.pair.grid.window(col - reach_px, row - reach_px, *(2 * reach_px + 1,) * 2)
 
     def read(self) -> tuple[Patch, Patch]:
-        """Return reference and input with all that shifts and filters reach.
+        """Return reference and input patches that include the reach of shifts and filters.
 
         Raises
         ------
         RasterContentError
-            There is too little to match.
+            A window has too few valid pixels or is constant.
         """
         piece = self.grid(self.chip_px // 2 + self.radius_px + BORDER_PX)
         pair = self.pair
@@ -134,9 +134,9 @@ class SurfaceSettings:
     gpve_order
         Order of the histogram's B-spline.
     entropy_order
-        Of Rényi's and of Tsallis' entropy.
+        Order of the Rényi or Tsallis entropy.
     sample
-        Pixels that MLMI is estimated from.
+        Number of pixels that MLMI is estimated from.
     """
 
     similarity: str = "fused"
@@ -164,11 +164,11 @@ class SurfaceSettings:
         Parameters
         ----------
         reference, input
-            Windows of one size with all that shifts and filters reach, see `Window.read`.
+            Windows of equal size that include the reach of shifts and filters; see `Window.read`.
         radius
             Largest shift, in pixels.
         context
-            Threads to work in, progress, and the seed of samples.
+            Provides threads, progress, and the seed of samples.
 
         Returns
         -------
@@ -198,7 +198,7 @@ class SurfaceSettings:
         template, search = (describe(patch, pixels, settings) for patch in (reference, input))
         template = template.inner(radius)
         deviations = similarity_surface(template, search, radius, settings, context)
-        if self.similarity not in MEASURES:  # a sum of several has no values of its own
+        if self.similarity not in MEASURES:  # fused: a sum of measures has no values of its own
             return deviations, deviations
         values = MEASURES[self.similarity](template, search, context)
         return values.reshape(-1, *deviations.shape).mean(axis=0), deviations
@@ -223,7 +223,7 @@ class SurfaceSettings:
             self.gpve_order,
             context,
         )
-        # Powers of shares: the surface would be flat, or infinite.
+        # Powers of shares overflow or underflow: the surface would be infinite or flat.
         if self.similarity == "tsallis" and not (np.isfinite(values).all() and values.any()):
             raise ParameterError(
                 f"Tsallis' entropy of order {self.entropy_order:g} has values here that are beyond "
@@ -254,7 +254,7 @@ def _radius_px(grid: Grid, radius_m: float | None) -> int:
 
 
 def second_peak(surface: Surface, first: Peak) -> Peak | None:
-    """Return the highest peak of a surface that lies apart from the first one."""
+    """Return the highest peak of a surface that is clearly separate from the first one."""
     radius = surface.shape[0] // 2
     rows, cols = np.nonzero(surface >= maximum_filter(surface, 3, mode="nearest"))
     inner = (np.abs(np.stack([rows, cols]) - radius) < radius).all(axis=0)
