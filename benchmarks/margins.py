@@ -101,7 +101,7 @@ def _rest_peak(evidence: RegistrationEvidence) -> float:
 
 
 def _off_drawn(evidence: RegistrationEvidence) -> float:
-    """Return how far two camera images move off the movement of drawn content."""
+    """Return how far the movement of two camera images is from that of drawn content."""
     rest = _without_drawn(evidence)
     if rest is None or rest.shared.sensors is not Sensors.CAMERAS:
         return math.nan
