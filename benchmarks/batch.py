@@ -127,7 +127,7 @@ def time_batch(name: str, executor: Executor, pair: Pair, rows: int) -> Record:
 
 
 def warm(executor: Executor) -> None:
-    """Let every worker import the tool; a short task keeps each worker busy meanwhile."""
+    """Let every worker import the tool; the tasks last long enough that no worker takes two."""
     wait([executor.submit(_import) for _ in range(WORKERS)])
 
 

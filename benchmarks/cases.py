@@ -30,7 +30,7 @@ REFERENCE_TRANSFORM = Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 5_000_000.0)
 SAR_OPTICAL = "sar-optical"
 KINDS = (SAR_OPTICAL, "sar-sar", "optical-optical", "optical-infrared", "day-night")
 
-# Further cases of one place, found by visual inspection: their file names differ.
+# Cases of another case's place, found by visual inspection: the file names do not show it.
 _SAME_PLACE = {"ss-yellow-c": "ss-meander", "oo-cloudy-sentinel": "so-cloudy-sentinel"}
 
 # Geotransforms refer to a pixel's corner, positions here to its centre.
@@ -125,7 +125,7 @@ def write_case(case: RealCase, shift_px: tuple[float, float], folder: Path) -> P
     """Write a case as a georeferenced pair.
 
     The input's geotransform combines the linear part of the truth with a wrong shift: it puts
-    every pixel (columns, rows) `shift_px` reference pixels from its place.
+    every pixel `shift_px` (columns, rows) reference pixels off its place.
     """
     to_input = Affine(*case.matrix.ravel())
     shift = Affine.translation(*shift_px)

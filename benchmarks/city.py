@@ -28,7 +28,7 @@ class Setting:
     Parameters
     ----------
     spec
-        As in `coregister`, except for the images' content that is compared.
+        As in `coregister`, except for the similarity.
     median_px
         Largest wanted median error on the ground; None: reported only.
     share_within

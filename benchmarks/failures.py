@@ -44,7 +44,7 @@ _PAGE = 4096
 # Space for the file system itself, and for hidden names.
 _SPARE = 16 * _PAGE
 
-# After every such number of kills the same job runs again; after the others, a shorter one.
+# After kills at multiples of this step the same job runs again; after others, a shorter one.
 _AGAIN = 5
 
 

@@ -35,7 +35,7 @@ REACH_PX = 1.5 * SPACING_PX
 # A distortion beyond any model of degree 1: up to 1.6 px from chip to chip.
 WAVE_PX, WAVE_LENGTH_PX = 2.5, 300.0
 
-# Settings were tuned on seeds 1 to 4.
+# Settings were compared on seeds 1 to 4.
 SIMULATED = tuple((density, seed) for seed in (5, 6) for density in ("rural", "suburban"))
 SIZE_PX = 1000
 

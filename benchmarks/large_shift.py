@@ -23,7 +23,8 @@ SIMULATED_SHIFT_PX = 500.0
 SIMULATED_SIZE_PX = 4000
 SIMULATED_SEEDS = 2
 
-# Smallest common ground of real pairs, on both axes: enough to match at the largest shift.
+# Common ground of real pairs, on both axes, that must remain at the largest shift, so that there
+# is something to match.
 _COMMON_PX = 300
 
 _SIMULATED = "simulated"

@@ -30,7 +30,7 @@ _GROUPS = {
     **{kind: (kind,) for kind in KINDS},
     **{f"simulated {density}": (density,) for density in _DENSITIES},
 }
-# The groups of the programs' tables, which take longer.
+# Fewer groups for the programs' tables, which are longer.
 _PROGRAM_GROUPS = {
     "SAR–optical, real": (SAR_OPTICAL,),
     "SAR–optical, simulated": _DENSITIES,

@@ -117,7 +117,7 @@ def apply_matrix(matrix: FloatArray, px: FloatArray) -> FloatArray:
 
 
 def write_offset(pair: Pair, offset_px: FloatArray, folder: Path) -> Pair:
-    """Write both images on one grid, the input displaced by a known shift, cropped to valid pixels.
+    """Write both images on one grid, the input displaced by a known shift, cropped to common data.
 
     Every program gets the same files, including those without georeferencing or masks.
     """

@@ -213,7 +213,7 @@ def measure_bins(pair: Aligned) -> list[dict[str, Any]]:
 
 
 def is_true(peak: Peak, sigma_px: float) -> bool:
-    """Return whether a peak equals the truth within its uncertainty."""
+    """Return whether a peak lies within `CORRECT_PX` plus the truth's uncertainty of the truth."""
     return float(np.hypot(*peak)) <= sigma_px + CORRECT_PX
 
 
