@@ -40,7 +40,7 @@ GOAL_PX = {RURAL: 1.0, URBAN: 2.0}
 _LARGEST_SHIFT_M = 300.0
 _NEAR_PX = 2.0
 
-# Control points of the round trip: their number and accuracy; number and size of blunders.
+# Control points of the round trip: their number and accuracy; share and size of blunders.
 _POINTS = 100
 _NOISE_PX = 0.3
 _BLUNDERS = 0.3
