@@ -1,4 +1,4 @@
-"""Registrations judged without some of the rules: whether anything hinges on them."""
+"""Registrations judged without some of the rules: which results depend on them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from groundtie.registration.rules import RULES
 
 
 def leave_out(names: Sequence[str]) -> None:
-    """Judge without the rules of these names, in this process.
+    """Switch off the rules with these names in this process.
 
     Raises
     ------
     ValueError
-        There is no rule of one of these names.
+        No rule has one of these names.
     """
     known = {rule.name for rules in RULES.values() for rule in rules}
     for name in names:
@@ -27,7 +27,7 @@ def leave_out(names: Sequence[str]) -> None:
 
 
 def left_out() -> tuple[str, ...]:
-    """Return the names of rules that are left out in this process."""
+    """Return the names of the rules that are switched off in this process."""
     return tuple(
         rule.name
         for stage, rules in RULES.items()

@@ -1,4 +1,4 @@
-"""How far a registration is from the truth, and what that makes of it."""
+"""The error of a registration, and the verdict on it by this error."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 Mapping = Callable[[FloatArray], FloatArray]
 
-# What is accepted is correct up to the first, and silently wrong beyond the second, both beyond
-# how far the truth itself can be believed.
+# An accepted registration is correct up to the first error and silently wrong beyond the second;
+# the uncertainty of the truth is added to both.
 CORRECT_PX = 1.0
 SILENTLY_WRONG_PX = 3.0
 
@@ -29,15 +29,15 @@ _LATTICE = 21
 
 @dataclass(frozen=True)
 class Truth:
-    """Which input positions belong to which reference positions.
+    """Input positions that correspond to reference positions.
 
     Parameters
     ----------
     reference_px, input_px
-        Positions (col, row) that belong together, float64 shape (n, 2).
+        Corresponding positions (col, row), float64 shape (n, 2).
     linear
-        Input pixels per reference pixel, shape (2, 2): what takes errors in input pixels to
-        reference pixels.
+        Input pixels per reference pixel, shape (2, 2): its inverse converts errors from input
+        pixels to reference pixels.
     """
 
     reference_px: FloatArray
@@ -46,12 +46,12 @@ class Truth:
 
     @classmethod
     def on_lattice(cls, mapping: Mapping, size: tuple[int, int], linear: FloatArray) -> Truth:
-        """Return the truth at a lattice over the whole reference of `size` (columns, rows)."""
+        """Return the truth on a lattice over the whole reference of `size` (columns, rows)."""
         px = lattice(size)
         return cls(px, mapping(px), linear)
 
     def off_px(self, found: Mapping) -> FloatArray:
-        """Return how far a mapping is off, in reference pixels, shape (n, 2).
+        """Return the errors of a mapping in reference pixels, shape (n, 2).
 
         Parameters
         ----------
@@ -61,27 +61,27 @@ class Truth:
         return (found(self.reference_px) - self.input_px) @ np.linalg.inv(self.linear).T
 
     def error_px(self, found: Mapping) -> float:
-        """Return the root mean square error, in reference pixels, of a mapping; see `off_px`."""
+        """Return the root mean square error of a mapping in reference pixels; see `off_px`."""
         return float(np.sqrt(np.mean(np.sum(self.off_px(found) ** 2, axis=1))))
 
 
 def lattice(size: tuple[int, int]) -> FloatArray:
-    """Return positions (col, row) that cover an image of `size` (columns, rows), its border too."""
+    """Return a lattice (col, row) over an image of `size` (columns, rows), including its border."""
     side = [np.linspace(0, count - 1, _LATTICE) for count in size]
     return np.stack(np.meshgrid(*side), axis=-1).reshape(-1, 2)
 
 
 def classify(accepted: bool, error_px: float, sigma_px: float) -> str:
-    """Return what a registration is.
+    """Return the verdict on a registration by its error.
 
     Parameters
     ----------
     accepted
         Whether the tool accepted it.
     error_px
-        Its error; infinite where nothing could have been right, as for two different places.
+        Its error; infinite where no transform is right, as for two different places.
     sigma_px
-        How far the truth itself can be believed.
+        Uncertainty of the truth itself.
 
     Returns
     -------

@@ -26,19 +26,19 @@ from .pipeline_runs import register_specified
 
 @dataclass(frozen=True)
 class Pair:
-    """Two georeferenced images and what is known of them.
+    """Two georeferenced images and their truth.
 
     Parameters
     ----------
     reference, input
         The files.
     truth
-        The best that is known: check points where there are some, else the lattice. None: the
-        images do not show the same place, and every registration is wrong.
+        The best known truth: check points where there are some, else the lattice. None: the images
+        show different places, so that every registration is wrong.
     lattice
-        The truth all over the reference; the same as `truth` where there are no check points.
+        The truth over the whole reference; equal to `truth` where there are no check points.
     sigma_px
-        How far the truth can be believed, in reference pixels.
+        Uncertainty of the truth, in reference pixels.
     """
 
     reference: Path
@@ -50,26 +50,26 @@ class Pair:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one registration.
+    """The outcome of one registration.
 
     Parameters
     ----------
     name, group
-        Which case, and with which others it is counted.
+        The case, and the group it is counted in.
     verdict, lattice_verdict
-        One of `accuracy.VERDICTS`, by the errors of the same name.
+        One of `accuracy.VERDICTS`, by `error_px` and `lattice_error_px`.
     error_px, lattice_error_px
         Errors against `Pair.truth` and `Pair.lattice`; NaN for refused registrations.
     sigma_px
-        How far the truth can be believed.
+        Uncertainty of the truth.
     seconds
         Wall-clock time of the call.
     claimed_rmse_px
-        Error that the tool itself claims.
+        The tool's own estimate of the error.
     model, reason
-        What the tool chose and said.
+        The model that the tool chose, and its message.
     claimed_ce90_px
-        Radius that the tool states to hold 90 % of the errors.
+        Radius within which the tool expects 90 % of the errors.
     """
 
     name: str
@@ -97,14 +97,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Try:
-    """What a call of a tool came to, before it is judged.
+    """The result of a tool's call before it is judged.
 
     Parameters
     ----------
     result
-        What it returned; None if there is nothing to judge.
+        The tool's result; None if there is nothing to judge.
     verdict, reason
-        Why there is nothing: `REFUSED` or `CRASHED`, and what was said; empty with a result.
+        Without a result, `REFUSED` or `CRASHED` and the message; else empty.
     seconds
         Wall-clock time of the call.
     """
@@ -129,7 +129,7 @@ def tried(call: Callable[[], Any]) -> Try:
         verdict = REFUSED
         reason = str(refusal) if refusal.verdict is None else refusal.verdict.reason
     except Exception as error:
-        # A finding like any other: it is counted, and `run.py` exits with 1.
+        # A crash is a finding, too: it is counted, and `run.py` exits with 1.
         traceback.print_exc()
         verdict, reason = CRASHED, repr(error)
     return Try(result, verdict, reason, time.perf_counter() - started)
@@ -145,9 +145,9 @@ def attempt(
     spec: Specification | None = None,
     **parameters: Any,
 ) -> Outcome:
-    """Register a pair by a tool, with its `parameters`, and compare with the truth.
+    """Register a pair by a tool, with its `parameters`, and compare the result with the truth.
 
-    With a specification, the pair is registered as it asks, whatever the tool.
+    A specification, if given, decides how the pair is registered, whatever the tool.
     """
     with tempfile.TemporaryDirectory() as folder:
         files = pair.reference, pair.input, Path(folder) / "registered.tif"
@@ -208,11 +208,11 @@ def accepted(outcomes: Iterable[Outcome]) -> list[Outcome]:
 
 
 def median_px(outcomes: Sequence[Outcome]) -> float:
-    """Return the median error of what was accepted; NaN if nothing was."""
+    """Return the median error of the accepted registrations; NaN if there are none."""
     errors = [outcome.error_px for outcome in accepted(outcomes)]
     return float(np.median(errors)) if errors else float("nan")
 
 
 def count(outcomes: Iterable[Outcome], verdict: str, on_lattice: bool = False) -> int:
-    """Return how many outcomes have a verdict, by the one error or the other."""
+    """Return the number of outcomes with a verdict, by the error against one truth or the other."""
     return sum((o.lattice_verdict if on_lattice else o.verdict) == verdict for o in outcomes)

@@ -1,4 +1,4 @@
-"""Batches: rows a second in warm processes, of one worker, two workers, and Dask on loopback."""
+"""Batches: rows per second in warm processes with one worker, two workers, and Dask on loopback."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SEED = 1
 
 @dataclass(frozen=True)
 class Record:
-    """One batch: rows, seconds of the clock, and processor seconds a row."""
+    """One batch: its rows, wall-clock seconds, and processor seconds per row."""
 
     executor: str
     rows: int
@@ -43,13 +43,13 @@ class Record:
 
     @property
     def rows_per_second(self) -> float:
-        """Rows a second."""
+        """Rows per second."""
         return self.rows / self.seconds
 
 
 @dataclass(frozen=True)
 class _Timed:
-    """A tool's result, and what it took of the processor."""
+    """A tool's result, and its processor time."""
 
     summary_of: dict[str, Any]
 
@@ -58,7 +58,7 @@ class _Timed:
 
 
 def load_timed(name: str) -> Tool:
-    """Return a tool whose summary has the processor seconds of its call, too."""
+    """Return a tool whose summary also holds the processor seconds of its call."""
     tool = load_tool(name)
 
     @functools.wraps(tool.run)
@@ -113,7 +113,7 @@ def _dask() -> Iterator[Executor | None]:
 
 
 def time_batch(name: str, executor: Executor, pair: Pair, rows: int) -> Record:
-    """Time a batch in workers that are warm."""
+    """Time a batch in warm workers."""
     with tempfile.TemporaryDirectory() as folder:
         warm(executor)
         _batch(executor, pair, WORKERS, Path(folder))
@@ -127,7 +127,7 @@ def time_batch(name: str, executor: Executor, pair: Pair, rows: int) -> Record:
 
 
 def warm(executor: Executor) -> None:
-    """Have every worker import the tool: a short task keeps one of them busy."""
+    """Let every worker import the tool; the tasks last long enough that no worker takes two."""
     wait([executor.submit(_import) for _ in range(WORKERS)])
 
 
@@ -145,7 +145,7 @@ def _batch(executor: Executor, pair: Pair, rows: int, folder: Path) -> BatchResu
 
 
 def goals(records: list[Record]) -> list[Goal]:
-    """Return what is wanted of these records, and what was found."""
+    """Return the goals for the records and their results."""
     by_name = {record.executor: record for record in records}
     two = by_name[TWO].rows_per_second
     found = [

@@ -1,4 +1,4 @@
-"""Whether errors are as large as verdicts say: CE50, CE90, CE95 against errors that are known."""
+"""Whether verdicts state realistic errors: CE50, CE90, CE95 against known errors."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from .suites import Goal, Settings, SuiteResult, Table, by_group, of_classes, ru
 ACCEPTED = "accepted"
 SAID = {"ce50_px": 0.5, "ce90_px": 0.9, "ce95_px": 0.95}
 
-# Of every so many seeds one is a large scene, too: it takes five times as long.
+# One of this many seeds is a large scene, too: it takes five times as long.
 _SMALL_PX, _LARGE_PX, _LARGE_EVERY = 500, 1500, 5
 
-# Ground of dense towns is found in larger scenes only: name, side in pixels, their size in metres.
+# The ground of dense towns is found in larger scenes only: name, side and pixel size in metres.
 _CITIES = ("city, 1 m", 1000, 1.0), ("city, 2 m", 800, 2.0)
 
 _RADIUS_M = 20.0
 
-# What is wanted of the runs of each class, and of how many runs that can be told.
+# Wanted share of places within CE90 for each class, and the number of runs that can show it.
 _WANTED = 0.88, 0.93
 _ENOUGH = 20
 
@@ -53,24 +53,24 @@ class Made(Protocol):
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """What became of one registration.
+    """The outcome of one registration.
 
     Parameters
     ----------
     name, group
-        Which case, and its class.
+        The case, and its class.
     verdict
         Accepted, refused or crashed.
     reason
-        What the tool said.
+        The tool's message.
     rms_px
         Root mean square error over the reference, in its pixels.
     sigma_px
-        How far the truth can be believed.
+        Uncertainty of the truth.
     ce50_px, ce90_px, ce95_px
-        Radii that the verdict gives.
+        Radii that the verdict states.
     within
-        For each of them, the share of places of the reference whose error is not larger.
+        For each radius, the share of places of the reference whose error does not exceed it.
     seconds
         Wall-clock time.
     """
@@ -103,7 +103,7 @@ class CalibrationRun:
 
 @dataclass(frozen=True)
 class SimulatedCase:
-    """A simulated pair, registered by the tool that fits."""
+    """A simulated pair, registered by the tool for its kind."""
 
     made: Made
     group: str
@@ -112,7 +112,7 @@ class SimulatedCase:
     radius_m: float = _RADIUS_M
 
     def run(self, workers: int | None) -> CalibrationRun:
-        """Make the pair if need be, register it and compare."""
+        """Make the pair if needed, register it and compare."""
         pair = self.made.pair(self.cache)
         return compare(self.made.name, self.group, self.tool, pair, self.radius_m, workers)
 
@@ -126,11 +126,11 @@ class RealPairCase:
 
     @property
     def group(self) -> str:
-        """Its class."""
+        """Class of the case."""
         return f"real {self.case.kind}"
 
     def run(self, workers: int | None) -> CalibrationRun:
-        """Write the pair, register it and compare."""
+        """Write the pair, register it, and compare."""
         shift = draw_shift(self.case, LARGEST_SHIFT_PX, self.number)
         with tempfile.TemporaryDirectory() as folder:
             pair = write_case(self.case, shift, Path(folder))
@@ -169,12 +169,12 @@ def compare(
 
 
 def with_truth_px(radius_px: float, said: float, sigma_px: float) -> float:
-    """Return the radius of errors against a truth that errs itself, with a root mean square."""
+    """Return a radius enlarged by the root mean square error of the truth."""
     return math.hypot(radius_px, sigma_px * math.sqrt(-math.log(1 - said)))
 
 
 def wilson(held: float, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share that was seen in so many runs ([Wilson1927])."""
+    """Return the 95 % interval of a share that was observed in a number of runs ([Wilson1927])."""
     if count == 0:
         return 0.0, 1.0
     middle = (held + _Z**2 / (2 * count)) / (1 + _Z**2 / count)
@@ -214,7 +214,7 @@ def cases(settings: Settings) -> list[SimulatedCase | RealPairCase]:
 
 
 def _simulated(seed: int, size: int, cache: Path) -> list[SimulatedCase]:
-    """Return pairs of all classes; looks and changes differ from seed to seed."""
+    """Return pairs of all classes; looks and changes vary with the seed."""
     further = (("looks", float(1 + seed % 3)), ("changed", 10.0 * (seed % 2)))
     is_large = size >= _LARGE_PX
     large = ", large" if is_large else ""
@@ -238,7 +238,7 @@ def _simulated(seed: int, size: int, cache: Path) -> list[SimulatedCase]:
 
 
 def goal(name: str, runs: Sequence[CalibrationRun]) -> Goal:
-    """Return the goal of a class and what was found."""
+    """Return the goal of a class, with its result."""
     share, count = coverage(runs, 1)
     low, high = _WANTED
     reached = None if count < _ENOUGH else low <= share <= high
@@ -247,14 +247,14 @@ def goal(name: str, runs: Sequence[CalibrationRun]) -> Goal:
 
 
 def coverage(runs: Sequence[CalibrationRun], which: int) -> tuple[float, int]:
-    """Return the share of places within a radius, over accepted runs, and how many these are."""
+    """Return the share of places within a radius over the accepted runs, and their number."""
     accepted = [one for one in runs if one.verdict == ACCEPTED]
     share = float(np.mean([one.within[which] for one in accepted])) if accepted else math.nan
     return share, len(accepted)
 
 
 def coverage_table(groups: dict[str, list[CalibrationRun]]) -> Table:
-    """Return a row for each class, and one for all."""
+    """Return a table with a row for each class and one for all."""
     head = (
         "class",
         "runs",

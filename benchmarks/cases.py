@@ -23,17 +23,17 @@ from groundtie.rasters.grid import compose
 from .accuracy import FloatArray, Truth
 from .attempt import Pair
 
-# A made-up place: reference pixels of 1 m, so that search radii in metres are pixels.
+# An arbitrary place: reference pixels of 1 m make search radii in metres equal to pixels.
 CRS = "EPSG:32633"
 REFERENCE_TRANSFORM = Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 5_000_000.0)
 
 SAR_OPTICAL = "sar-optical"
 KINDS = (SAR_OPTICAL, "sar-sar", "optical-optical", "optical-infrared", "day-night")
 
-# Other cases that show the same place, which no file name tells: seen by eye.
+# Cases of another case's place, found by visual inspection: the file names do not show it.
 _SAME_PLACE = {"ss-yellow-c": "ss-meander", "oo-cloudy-sentinel": "so-cloudy-sentinel"}
 
-# Geotransforms give a pixel's corner, positions here its centre.
+# Geotransforms refer to a pixel's corner, positions here to its centre.
 _TO_CENTRE = Affine.translation(0.5, 0.5)
 
 
@@ -48,11 +48,11 @@ class RealCase:
     reference, input
         Files, mostly without georeferencing.
     sigma_px
-        How far the truth can be believed, in reference pixels.
+        Uncertainty of the truth, in reference pixels.
     matrix
         Input (col, row) = matrix · reference (col, row, 1), shape (2, 3).
     check_points
-        Table with the columns reference col, row and input col, row, if there is one.
+        Table with the columns reference col, row and input col, row, if one exists.
     """
 
     name: str
@@ -73,7 +73,7 @@ class RealCase:
         return np.asarray(px @ self.matrix[:, :2].T + self.matrix[:, 2])
 
     def truths(self) -> tuple[Truth, Truth]:
-        """Return the best truth and the one all over the reference."""
+        """Return the best truth, and the truth over the whole reference."""
         lattice = Truth.on_lattice(
             self.reference_to_input, image_size(self.reference), self.matrix[:, :2]
         )
@@ -90,7 +90,7 @@ def data_folder() -> Path:
 
 
 def read_cases(folder: Path, kinds: Collection[str] = KINDS) -> tuple[RealCase, ...]:
-    """Return the cases of some kinds in a folder: by default, neither rotated nor with RPCs."""
+    """Return a folder's cases of some kinds; by default, those neither rotated nor with RPCs."""
     listed = json.loads((folder / "cases.json").read_text(encoding="utf-8"))
     return tuple(_case(folder, values) for values in listed if values["kind"] in kinds)
 
@@ -124,8 +124,8 @@ def search_radius_m(largest_px: float) -> float:
 def write_case(case: RealCase, shift_px: tuple[float, float], folder: Path) -> Pair:
     """Write a case as a georeferenced pair.
 
-    The input's geotransform carries the linear part of the truth, and a wrong shift: it claims
-    every pixel to lie (columns, rows) `shift_px` reference pixels from its place.
+    The input's geotransform combines the linear part of the truth with a wrong shift: it puts
+    every pixel `shift_px` (columns, rows) reference pixels off its place.
     """
     to_input = Affine(*case.matrix.ravel())
     shift = Affine.translation(*shift_px)
@@ -149,7 +149,7 @@ def image_size(path: Path) -> tuple[int, int]:
 
 
 def read_image(path: Path) -> NDArray[Any]:
-    """Return all bands, shape (bands, rows, columns); palettes of these files are plain grey."""
+    """Return all bands, shape (bands, rows, columns); the files' palettes are plain grey."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         with rasterio.open(path) as source:
@@ -163,7 +163,7 @@ def write_image(
     crs: Any = CRS,
     nodata: float | None = None,
 ) -> Path:
-    """Write bands, where they lie; three or four bands of bytes become RGB and RGBA."""
+    """Write georeferenced bands; three or four bands of bytes become RGB and RGBA."""
     bands, height, width = image.shape
     with rasterio.open(
         path,

@@ -1,4 +1,4 @@
-"""How many chips of a pair each similarity matches."""
+"""The share of a pair's chips that each similarity matches."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from groundtie.similarity.surface import SIMILARITIES, SimilaritySettings
 
 from .offsets import OffsetPair, Scene, open_offset
 
-# The true peak lies away from the centre of the surface, which a method might prefer.
+# The true peak lies off the centre of the surface, which a method might prefer.
 OFFSETS_PX = (2.0, 6.0)
 CHIPS_PX = (61, 101, 201)
 RADIUS_PX = 12
@@ -31,20 +31,20 @@ SPACING_PX = 30
 
 @dataclass(frozen=True)
 class ChipShare:
-    """How many chips of a pair one similarity matched.
+    """The share of a pair's chips that one similarity matches.
 
     Parameters
     ----------
     name, group
         The pair.
     similarity, chip_px
-        What was matched, how.
+        The similarity, and the size of the chips.
     chips
         Number of chips.
     shares
-        Share of them within each of `LIMITS_PX` of the truth; empty without chips.
+        Share of the chips within each of `LIMITS_PX` of the truth; empty without chips.
     milliseconds
-        Time a chip, reading included.
+        Time per chip, including reading.
     """
 
     name: str
@@ -58,7 +58,7 @@ class ChipShare:
 
 @dataclass(frozen=True)
 class ChipShares:
-    """What all similarities reached on the chips of one pair."""
+    """The shares of all similarities on one pair."""
 
     records: tuple[ChipShare, ...]
 
@@ -77,7 +77,7 @@ class ChipCase:
     most_chips: int
 
     def run(self, workers: int | None) -> ChipShares:
-        """Match the chips and compare with the truth."""
+        """Match the chips and compare them with the truth."""
         with (
             tempfile.TemporaryDirectory() as folder,
             threads(workers) as context,
@@ -91,7 +91,7 @@ class ChipCase:
         return ChipShares(tuple(records))
 
     def share(self, pair: OffsetPair, similarity: str, chip_px: int, context: Context) -> ChipShare:
-        """Return how many chips of a size one similarity matched."""
+        """Return the share of chips of one size that a similarity matches."""
         grid = pair.images.grid
         matcher = ChipMatcher(pair.images, SimilaritySettings(similarity))
         # Larger chips take longer, and overlap more.

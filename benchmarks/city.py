@@ -1,4 +1,4 @@
-"""A simulated dense city: whether layover draws a registration away from the ground."""
+"""A simulated dense city: whether layover biases a registration against the ground."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ WITHIN_PX = 1.0
 
 @dataclass(frozen=True)
 class Setting:
-    """How cities are registered, and what is wanted of it.
+    """Settings for the registration of cities, and the wanted accuracy.
 
     Parameters
     ----------
     spec
-        How: as `coregister` does but for what is compared.
+        As in `coregister`, except for the similarity.
     median_px
-        Largest median error on the ground that is wanted; None: reported only.
+        Largest wanted median error on the ground; None: reported only.
     share_within
-        Smallest share of the seeds within `WITHIN_PX` that is wanted; None: reported only.
+        Smallest wanted share of seeds within `WITHIN_PX`; None: reported only.
     """
 
     spec: Specification = COREGISTER
@@ -49,21 +49,21 @@ SETTINGS: dict[str, Setting] = {
 
 @dataclass(frozen=True)
 class CityCase:
-    """A city, registered by one of the settings."""
+    """A city, registered with one of the settings."""
 
     seed: int
     setting: str
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair = city(self.seed).pair(self.cache)
         spec = SETTINGS[self.setting].spec
         return attempt(f"city, seed {self.seed}", self.setting, pair, workers, spec=spec)
 
 
 def city(seed: int, changed_percent: float = CHANGED_PERCENT) -> Simulation:
-    """Return the city of a seed, whose views follow from it: 35–47° radar, 5–25° camera."""
+    """Return the city of a seed, which also sets the views: 35–47° radar, 5–25° camera."""
     generator = np.random.default_rng((35, 47, seed))
     further = (
         ("changed", changed_percent),
@@ -79,7 +79,7 @@ def city(seed: int, changed_percent: float = CHANGED_PERCENT) -> Simulation:
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     seeds = settings.seed_numbers()
-    # Seed by seed, so that processes do not make the same pair at the same time.
+    # Seed by seed, so that no two processes make the same pair at the same time.
     for seed in seeds:
         city(seed).pair(settings.cache)
     cases = [CityCase(seed, setting, settings.cache) for seed in seeds for setting in SETTINGS]
@@ -95,7 +95,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals of one setting and what was found."""
+    """Return the goals of one setting, with their results."""
     setting, median, share = SETTINGS[name], median_px(outcomes), share_within(outcomes)
     wanted, at_least = setting.median_px, setting.share_within
     return (
@@ -133,5 +133,5 @@ def ground_table(groups: Mapping[str, Sequence[Outcome]]) -> Table:
 
 
 def share_within(outcomes: Sequence[Outcome]) -> float:
-    """Return the share of all cases, refused ones too, that are accepted and that accurate."""
+    """Return the share of all cases, also refused ones, that are accepted within `WITHIN_PX`."""
     return sum(o.error_px <= WITHIN_PX for o in accepted(outcomes)) / len(outcomes)

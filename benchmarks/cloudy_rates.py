@@ -1,4 +1,4 @@
-"""Correct-match rates under simulated clouds, by what masks their features ([Patel2017] 5.5)."""
+"""Correct-match rates under simulated clouds, by feature mask ([Patel2017] 5.5)."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from .match_rates import (
     rate_of,
 )
 
-# Share of both images that clouds hide, how often they are drawn, and the method that is refined.
+# Cloud cover of both images, the number of draws of clouds, and the method that is refined.
 CLOUD_SHARE = 0.3
 CLOUD_DRAWS = 3
 REFINED = "HOG-81"
 
-# What leaves features out: support vector machines with these statistics and kernels, trained on
-# the image's other half; one that was trained on other pairs; and the mask of the clouds itself.
+# Refinements that leave features out: support vector machines with these statistics and kernels,
+# trained on the image's other half; one trained on other pairs; and the mask of the clouds.
 KERNEL, STATISTICS = "polynomial", "mean-variance"
 BANDS, TEXTURE = "polynomial, band ratios", "polynomial, texture"
 OTHERS, MASK = "polynomial, other pairs", "the mask itself"
@@ -46,7 +46,7 @@ MACHINES = {kernel: (STATISTICS, kernel) for kernel in KERNELS} | {
 }
 REFINEMENTS = (*MACHINES, OTHERS, MASK)
 
-# So many points of each image and class are passed on to train for other pairs.
+# Number of points of each image and class that are used to train for other pairs.
 _POINTS = 100
 
 
@@ -60,7 +60,7 @@ class Clear:
 
 @dataclass(frozen=True)
 class Clouded:
-    """An image under clouds: its features, where the clouds leave them, and what is around them."""
+    """An image under clouds: its features, and which of them the clouds leave."""
 
     image: Patch
     bands: NDArray[np.float32]
@@ -79,13 +79,13 @@ class Clouded:
 
 @dataclass(frozen=True)
 class CloudLabels:
-    """Labelled points of a pair under its first clouds, to train for other pairs."""
+    """Labelled points of a pair under its first clouds, for training on behalf of other pairs."""
 
     name: str
     labelled: Training
 
     def line(self) -> str:
-        """Return how many there are."""
+        """Return the number of points as a line of text."""
         return f"{self.name}: {len(self.labelled.kept)} labelled points"
 
 
@@ -103,17 +103,17 @@ class LabelCase:
 
 @dataclass(frozen=True)
 class CloudyCase:
-    """Refinement on a pair under simulated clouds, other ones in each image.
+    """Refinement on a pair under simulated clouds, which differ between the images.
 
-    Classifiers are trained on the features of one half, and matches counted in the other one; and
-    on `others`, points of other pairs.
+    Classifiers are trained on the features of one half, or on `others`, points of other pairs.
+    Matches are counted in the other half.
     """
 
     case: RealCase
     others: Training | None = None
 
     def run(self, workers: int | None) -> MatchRates:
-        """Match without refinement and with every one."""
+        """Match without refinement and with each refinement."""
         found: dict[str, list[Matched]] = {name: [] for name in ("", *REFINEMENTS)}
         foreign = None
         if self.others is not None:
@@ -133,7 +133,7 @@ class CloudyCase:
 
 
 def for_others(labels: Sequence[CloudLabels], name: str) -> Training:
-    """Return the points of all pairs but one."""
+    """Return the training points of all pairs but one."""
     return _joined([each.labelled for each in labels if each.name != name])
 
 
@@ -165,7 +165,7 @@ def _clouded(clear: Sequence[Clear], case: RealCase, draw: int) -> list[Clouded]
 def _matches(
     both: list[Clouded], middle: float, foreign: FeatureClassifier | None
 ) -> Iterator[tuple[str, Matched]]:
-    """Return the matches in each half without refinement and with every one."""
+    """Return the matches in each half without refinement and with each refinement."""
     labelled = {
         statistics: [each.training(statistics) for each in both]
         for statistics in {statistics for statistics, _ in MACHINES.values()}

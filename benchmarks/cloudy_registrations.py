@@ -22,7 +22,7 @@ from .real import LARGEST_SHIFT_PX
 
 TOOLS = ("match_optical", "coregister")
 
-# Clouds hide so much of the input: more than of what only loses some matches.
+# Cloud cover of the input: larger than where only some matches are lost.
 SHARE = 0.5
 
 
@@ -30,8 +30,8 @@ SHARE = 0.5
 class CloudyRegistration:
     """A georeferenced pair with a wrong shift, its input under clouds.
 
-    The classifier is trained on the same image under other clouds: on one of the same kind, at
-    its best.
+    The classifier is trained on the same image under other clouds, which favours it as much as
+    possible.
     """
 
     case: RealCase
@@ -40,7 +40,7 @@ class CloudyRegistration:
 
     @property
     def group(self) -> str:
-        """Return what it is counted with."""
+        """Return the group that the case is counted in."""
         return f"{self.tool}, {'classifier' if self.classified else 'no classifier'}"
 
     def run(self, workers: int | None) -> Outcome:
@@ -71,7 +71,7 @@ def _clouds(image: NDArray[Any], case: RealCase, draw: int) -> Clouds:
 
 
 def _classifier(pair: Pair, case: RealCase, folder: Path) -> Path:
-    """Train a classifier on the input under other clouds than it will have."""
+    """Train a classifier on the input under other clouds than it is registered with."""
     clear = read_image(pair.input)
     clouds = _clouds(clear, case, 1)
     image = write_image(clear, Affine.identity(), folder / "other.tif")
@@ -84,7 +84,7 @@ def _classifier(pair: Pair, case: RealCase, folder: Path) -> Path:
 
 
 def _overwrite(path: Path, values: NDArray[np.float32]) -> None:
-    """Replace all bands of a raster of integers, as far as its type reaches."""
+    """Replace all bands of a raster of integers, clipped to its data type."""
     with rasterio.open(path, "r+") as target:
         limits = np.iinfo(target.dtypes[0])
         rounded = np.clip(np.rint(values), limits.min, limits.max)

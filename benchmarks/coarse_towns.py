@@ -1,4 +1,4 @@
-"""Simulated towns in coarse pixels, whose streets are not resolved, and oblique views of them."""
+"""Simulated towns in pixels too coarse to resolve streets, seen obliquely."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ OFF_NADIR_DEG = (20.0, 35.0)
 
 @dataclass(frozen=True)
 class Town:
-    """What became of a town.
+    """The outcome of one town.
 
     Parameters
     ----------
     name, group
-        Which case, and with which others it is counted.
+        The case, and the group it is counted in.
     verdict, error_px
-        As of `attempt.Outcome`, but the error of refused transforms is known, too.
+        As in `attempt.Outcome`, but with the error of refused transforms, too.
     right_m, down_m
-        What the transform displaces check points by in the mean; not a number without one.
+        Mean displacement of the check points by the transform; NaN without a transform.
     is_by_ground
         Whether the ground alone was matched.
     reason
-        Of the verdict.
+        The verdict's reason.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Town:
 
 @dataclass(frozen=True)
 class CoarseTown:
-    """A town in pixels of a size, whose camera looks obliquely."""
+    """A town in pixels of one size, seen by an oblique camera."""
 
     density: str
     pixel_m: float
@@ -76,7 +76,7 @@ class CoarseTown:
     cache: Path
 
     def run(self, workers: int | None) -> Town:
-        """Make the pair if need be, register it and compare with the truth."""
+        """Make the pair if needed, register it and compare with the truth."""
         further = {"pixel_size": self.pixel_m, "off_nadir": self.off_nadir_deg, "looks": LOOKS}
         town = Simulation(SIZE_PX, self.density, self.seed, SHIFT_PX, tuple(further.items()))
         pair = town.pair(self.cache)

@@ -1,4 +1,4 @@
-"""What must be refused: images of different places, and images replaced by speckle."""
+"""Pairs that must be refused: images of different places, and images replaced by speckle."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ _QUICK_STEP = 60
 
 @dataclass(frozen=True)
 class Crossing:
-    """The reference of one place with the input of another, at the same claimed place."""
+    """The reference of one place and the input of another, georeferenced to the same place."""
 
     reference: RealCase
     input: RealCase
     tool: str = "coregister"
 
     def run(self, workers: int | None) -> Outcome:
-        """Register what cannot be registered."""
+        """Register the pair, which must be refused."""
         with tempfile.TemporaryDirectory() as folder:
             pair = write_crossing(self.reference, self.input, Path(folder))
             name = f"{self.reference.name} × {self.input.name}"
@@ -65,7 +65,7 @@ class Speckled:
     replaced: str
 
     def run(self, workers: int | None) -> Outcome:
-        """Register what cannot be registered."""
+        """Register the pair, which must be refused."""
         with tempfile.TemporaryDirectory() as folder:
             shift = draw_shift(self.case, LARGEST_SHIFT_PX, 0)
             pair = write_speckled(self.case, shift, self.replaced, Path(folder))
@@ -103,7 +103,7 @@ def write_speckled(
 
 
 def speckle(image: NDArray[Any], generator: np.random.Generator) -> NDArray[Any]:
-    """Return single-look speckle, the same in all bands, of an image's shape, type and contrast."""
+    """Return single-look speckle of an image's shape, type and contrast, the same in all bands."""
     amplitude = generator.rayleigh(size=image.shape[1:])
     standard = (amplitude - amplitude.mean()) / amplitude.std()
     values = image.mean() + image.std() * np.broadcast_to(standard, image.shape)
@@ -136,7 +136,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the suite's goal and what was found."""
+    """Return the suite's goal, with its result."""
     wrong, refused = len(accepted(outcomes)), count(outcomes, REFUSED)
     reached = None
     if wrong > 0:
@@ -148,7 +148,7 @@ def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
 
 
 def counts_by_group(outcomes: Sequence[Outcome]) -> Table:
-    """Return how many were accepted, by what does not belong together."""
+    """Return how many were accepted, by the kind of mismatch."""
     rows = [
         [
             name,
@@ -163,6 +163,6 @@ def counts_by_group(outcomes: Sequence[Outcome]) -> Table:
 
 
 def what_was_accepted(outcomes: Sequence[Outcome]) -> Table:
-    """Return what should have been refused."""
+    """Return the accepted pairs, all of which should have been refused."""
     rows = [[o.name, o.model, f"{o.claimed_rmse_px:.2f}"] for o in accepted(outcomes)]
     return Table("Accepted", ("images", "model", "claimed RMSE (px)"), rows)

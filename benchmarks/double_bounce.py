@@ -1,7 +1,7 @@
-"""Whether double bounce makes what is rendered of a surface model more like the radar image.
+"""Whether double bounce makes a rendered surface model more similar to the radar image.
 
-A wall that faces the radar and the ground before it reflect twice: a bright line at the foot of the
-wall. It is added here with several weights, of which the product has one.
+A wall that faces the radar and the ground before it reflect twice, which gives a bright line at the
+foot of the wall. The suite adds this line with several weights, one of them the product's.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from .attempt import on_pixels
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 from .towns import rough, seen_by_radar, to_model
 
-# How many echoes it adds for each pixel of the wall's height; 0: without.
+# Echoes added per pixel of the wall's height; 0: no double bounce.
 WEIGHTS = (0.0, 1.0, DOUBLE_BOUNCE, 10.0)
 
 
 @dataclass(frozen=True)
 class Bounce:
-    """What a weight makes of one city.
+    """The result of one weight on one city.
 
     Parameters
     ----------
     name, weight
-        Which city, and one of `WEIGHTS`.
+        The city, and one of `WEIGHTS`.
     is_accepted, reason
-        The verdict on the registration of the radar image to what is rendered.
+        The verdict on the registration of the radar image to the rendered model.
     error_px
-        Error of its transform, whatever the verdict is, in pixels of the model.
+        Error of the transform, whatever the verdict, in pixels of the model.
     correlation
-        Of the registered radar image with what is rendered; NaN: nothing was found.
+        Correlation of the registered radar image with the rendered model; NaN: no transform.
     """
 
     name: str
@@ -63,25 +63,25 @@ class Bounce:
     correlation: float
 
     def record(self) -> dict[str, Any]:
-        """Return it as values that JSON can carry."""
+        """Return the result as values that JSON can carry."""
         return plain(asdict(self))
 
     def line(self) -> str:
-        """Return it as a line of text."""
+        """Return the result as a line of text."""
         found = f"{self.error_px:.2f} px, correlation {self.correlation:.3f}"
         return f"{self.name}, weight {self.weight:g}: {found}; {self.reason}"
 
 
 @dataclass(frozen=True)
 class BounceCase:
-    """A radar image of a city, registered to its rough surface model, rendered with a weight."""
+    """A radar image of a city, registered to its rough surface model, rendered with one weight."""
 
     seed: int
     weight: float
     cache: Path
 
     def run(self, workers: int | None) -> Bounce:
-        """Render the model and register as the product does with what it renders itself."""
+        """Render the model and register the radar image to it, as the product does."""
         pair = seen_by_radar(self.seed).pair(self.cache)
         view = View.of(pair.input, None)
         assert view is not None
@@ -111,7 +111,7 @@ class BounceCase:
 
 
 def write_rendered(model: Path, view: View, weight: float, path: Path) -> None:
-    """Render a surface model as the product does, with this weight."""
+    """Render a surface model with a weight, otherwise as the product does."""
     with open_raster(model) as source:
         ground = SurfaceGround(Scene.of(source), RasterModel(source), (view,))
         write_image(ground, view, path, bounce=weight)
@@ -135,7 +135,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def weights_table(found: Sequence[Bounce]) -> Table:
-    """Return a table of what each weight makes of the cities."""
+    """Return a table of the results of each weight."""
     rows = []
     for weight in WEIGHTS:
         of_weight = [one for one in found if one.weight == weight]

@@ -1,4 +1,4 @@
-"""Jobs that write files, in children that are killed, or that meet a full disk."""
+"""Jobs that write files, in child processes that are killed or meet a full disk."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from typing import IO, Any
 from groundtie.errors import OutputError
 from groundtie.rasters import tiff_file
 
-# Nothing here takes more than seconds on an idle machine; a busy one may be twenty times slower.
+# No job takes more than seconds on an idle machine; a busy one may be twenty times slower.
 _TIME_LIMIT_S = 300
 
-# How a child ends: all written, refused as it should be, or by an exception that is a bug.
+# Exit codes of a child: everything written, refused with a message, or an exception (a bug).
 _DONE, _TOLD, _BUG = 0, 2, 1
 
 Work = Callable[[Path], None]
@@ -33,9 +33,9 @@ class End:
     Parameters
     ----------
     how
-        "done", "told" (by one line), "killed" (by us), "bug", "crash" or "hang".
+        "done", "told" (one line of message), "killed" (by the parent), "bug", "crash" or "hang".
     text
-        What it said: the line, or a traceback, and what libraries wrote past Python.
+        Output of the child: the line, or a traceback, and whatever libraries wrote past Python.
     """
 
     how: str
@@ -43,7 +43,7 @@ class End:
 
 
 def in_child(work: Callable[[], None], kill_expected: bool = False) -> End:
-    """Do work in a child that is forked, and return how that ended."""
+    """Do work in a forked child, and return how it ended."""
     heard, said = os.pipe()
     child = os.fork()
     if child == 0:
@@ -80,7 +80,7 @@ def _run(work: Callable[[], None], said: int) -> int:
 
 
 def _wait(child: int, stream: IO[bytes]) -> tuple[int | None, str]:
-    """Return the status of a child, None if it took too long, and what it said."""
+    """Return the status of a child (None if it took too long), and its output."""
     parts, found, status = [], 0, 0
     end = time.monotonic() + _TIME_LIMIT_S
     while not found:
@@ -96,8 +96,8 @@ def _wait(child: int, stream: IO[bytes]) -> tuple[int | None, str]:
 class Steps:
     """Counts the steps of a job that change the disk, and kills the process at one of them.
 
-    A step is a file that is made, written, flushed, linked, renamed or removed. What is written is
-    written by half before the process is killed.
+    A step creates, writes, flushes, links, renames or removes a file. A killed write leaves half
+    of its content.
     """
 
     def __init__(self, kill_at: int | None = None) -> None:
@@ -105,7 +105,7 @@ class Steps:
 
     @contextlib.contextmanager
     def watched(self) -> Iterator[Steps]:
-        """Watch what this process does."""
+        """Watch the steps of this process."""
         kept: list[tuple[Any, str, Any]] = []
         for owner, name in ((os, "replace"), (os, "link"), (os, "fsync"), (Path, "unlink")):
             kept.append((owner, name, getattr(owner, name)))
@@ -143,12 +143,12 @@ class Steps:
 
 @contextlib.contextmanager
 def disk(folder: Path, size: int) -> Iterator[Path]:
-    """Mount a disk of some bytes.
+    """Mount a disk of a number of bytes.
 
     Raises
     ------
     PermissionError
-        That is not allowed here.
+        Mounting is not allowed here.
     """
     folder.mkdir(exist_ok=True)
     options = f"size={size}"
@@ -166,7 +166,7 @@ def disk(folder: Path, size: int) -> Iterator[Path]:
 
 
 def make_read_only(folder: Path) -> None:
-    """Let nobody write to a disk any more."""
+    """Make a disk read-only for everybody."""
     subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
 
 

@@ -36,30 +36,30 @@ from .failing import End, Steps, Work, disk, hidden, in_child, make_read_only
 
 OLD, NEW, NEXT = "an older run", "this run", "the next run"
 
-# How much of what a job needs is free, in percent, on disks that are too small, or just not.
+# Free space in percent of the files' size, on disks that are too small or just large enough.
 _FREE = (0, 1, 2, 5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 85, 90, 92, 94, 96,
          98, 99, 101, 110)  # fmt: skip
 _PAGE = 4096
 
-# For what a disk needs itself, and for hidden names.
+# Space for the file system itself, and for hidden names.
 _SPARE = 16 * _PAGE
 
-# After each so many kills the same job runs again; after the others one that is shorter.
+# After kills at multiples of this step the same job runs again; after others, a shorter one.
 _AGAIN = 5
 
 
 @dataclass(frozen=True)
 class Job:
-    """Something that writes files into a folder.
+    """A job that writes files into a folder.
 
     Parameters
     ----------
     name
-        For people.
+        Name of the job.
     files
-        What it writes, in the order in which it is put in its place.
+        Files of the job, in the order in which they take their final names.
     work
-        Writes it.
+        Writes the files.
     """
 
     name: str
@@ -67,12 +67,12 @@ class Job:
     work: Work
 
     def as_run(self, folder: Path, run: str) -> None:
-        """Write the files as a run of an id."""
+        """Write the files as the run with an id."""
         with running(run):
             self.work(folder)
 
     def contents(self, folder: Path) -> dict[str, bytes]:
-        """Return what the files hold, of those that are there."""
+        """Return the contents of the files that exist."""
         return {
             name: (folder / name).read_bytes() for name in self.files if (folder / name).exists()
         }
@@ -80,7 +80,7 @@ class Job:
 
 @dataclass
 class Findings:
-    """What was tried, and what went wrong."""
+    """Numbers of trials, and faults that were found."""
 
     tried: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
@@ -94,7 +94,7 @@ class Findings:
 
 
 def run_of(path: Path) -> str | None:
-    """Return the id of the run that wrote a file; None: it carries none."""
+    """Return the id of the run that wrote a file; None: it has no id."""
     suffix = path.suffix
     if suffix == ".tif":
         with rasterio.open(path) as dataset:
@@ -123,7 +123,7 @@ def is_whole(path: Path) -> bool:
 
 
 def faults_of_files(job: Job, folder: Path, old: dict[str, bytes]) -> list[str]:
-    """Return what is wrong with the files under final names after a run that died."""
+    """Return the faults of the files under their final names after a run that died."""
     faults, runs = [], []
     for name in job.files:
         path = folder / name
@@ -145,7 +145,7 @@ def faults_of_files(job: Job, folder: Path, old: dict[str, bytes]) -> list[str]:
 
 
 def faults_of_next(job: Job, folder: Path, again: bool) -> list[str]:
-    """Return what is wrong after the next run: the same job again, or one of another file."""
+    """Return the faults after the next run, of the same job or of one with another file."""
     other = Job("other", ("other.json",), lambda folder: _write_other(folder / "other.json"))
     follower = job if again else other
     end = in_child(partial(follower.as_run, folder, NEXT))
@@ -163,14 +163,14 @@ def _write_other(path: Path) -> None:
 
 
 def steps_of(job: Job, folder: Path) -> int:
-    """Return how many steps a job has that change the disk."""
+    """Return the number of steps of a job that change the disk."""
     with Steps().watched() as steps:
         job.as_run(folder, NEW)
     return steps.count
 
 
 def kill(job: Job, before: Path, step: int, found: Findings, folder: Path) -> None:
-    """Kill a job at a step, in a folder like another one, and look at what it leaves."""
+    """Kill a job at a step in a copy of a folder, and check the files that it leaves."""
     shutil.copytree(before, folder)
     old = job.contents(folder)
 
@@ -187,7 +187,7 @@ def kill(job: Job, before: Path, step: int, found: Findings, folder: Path) -> No
 
 
 def faults_of_error(job: Job, folder: Path, end: End, old: dict[str, bytes]) -> list[str]:
-    """Return what is wrong after a run that could not write."""
+    """Return the faults after a run that could not write."""
     faults = [f"left over: {name}" for name in hidden(folder)]
     if end.how not in ("told", "done"):
         faults.append(f"{end.how}: {end.text}")
@@ -203,7 +203,7 @@ def faults_of_error(job: Job, folder: Path, end: End, old: dict[str, bytes]) -> 
 
 
 def fill(job: Job, before: Path, percent: int, found: Findings, folder: Path) -> None:
-    """Let a job write to a disk that is too small, or just not."""
+    """Run a job on a disk that is too small or just large enough."""
     old = job.contents(before)
     taken = sum(-(-len(content) // _PAGE) * _PAGE for content in old.values())
     free = max(taken * percent // 100, 1)
@@ -219,7 +219,7 @@ def fill(job: Job, before: Path, percent: int, found: Findings, folder: Path) ->
 
 
 def limit(job: Job, before: Path, percent: int, found: Findings, folder: Path) -> None:
-    """Let no file grow beyond a share of the largest."""
+    """Run a job with the file size limited to a share of the largest file."""
     shutil.copytree(before, folder)
     old = job.contents(folder)
     most = max(map(len, old.values())) * percent // 100
@@ -234,7 +234,7 @@ def limit(job: Job, before: Path, percent: int, found: Findings, folder: Path) -
 
 
 def lock(job: Job, before: Path, found: Findings, folder: Path) -> None:
-    """Let a job write to a disk that can only be read."""
+    """Run a job on a read-only disk."""
     old = job.contents(before)
     with disk(folder, sum(map(len, old.values())) * 2 + 100 * _PAGE):
         for name, content in old.items():
@@ -249,7 +249,7 @@ def lock(job: Job, before: Path, found: Findings, folder: Path) -> None:
 
 
 def jobs(scene: Path) -> Iterator[Job]:
-    """Make small scenes in a folder, and yield jobs on them."""
+    """Make small scenes in a folder, and yield the jobs on them."""
     pair, sensor = scene / "pair", scene / "sensor"
     groundtie.simulate(pair, size=700, looks=4.0, density="rural", seed=1)
     groundtie.simulate_sensor(sensor, size=300)
@@ -285,14 +285,14 @@ def jobs(scene: Path) -> Iterator[Job]:
 
 
 def run(every: int = 1, only: str = "") -> Findings:
-    """Let jobs fail in all ways.
+    """Make jobs fail in all ways.
 
     Parameters
     ----------
     every
-        1: at all steps and on disks of all sizes; n: at each n-th.
+        1: at every step and on disks of every size; n: at each n-th.
     only
-        What the names of the jobs begin with.
+        Beginning of the names of the jobs.
     """
     found = Findings()
     with tempfile.TemporaryDirectory() as made:
@@ -309,7 +309,7 @@ def run(every: int = 1, only: str = "") -> Findings:
             shutil.rmtree(work)
             for step in range(1, count + 1, every):
                 kill(job, before, step, found, work)
-            # Without older files the steps are fewer by the old ones' second names.
+            # Without older files there are fewer steps: the old files get no second names.
             for step in range(1, count - len(job.files) + 1, every):
                 kill(job, fresh, step, found, work)
             for percent in _FREE[::every]:

@@ -30,16 +30,16 @@ from .suites import Goal, Table
 RATIO = 0.8
 _HYBRID_CONTRAST = 0.03
 
-# A match is right within this of the truth, or within the truth's own sigma if that is larger.
+# A match is right within this distance of the truth, or within the truth's sigma if larger.
 _RIGHT_PX = 2.0
 
-# How far the prediction of the gate is off: as far as a rough shift may be.
+# Error of the gate's prediction, as large as that of a rough shift.
 _OFF_PX = np.array([1.5, -1.5])
 
-# Wrong matches fall this near a model by chance; RANSAC keeps what does.
+# RANSAC keeps matches within this distance of the model; wrong ones fall there by chance.
 _RANSAC_PX = 3.0
 
-# The whole chain of each detector is timed so often, and the shortest time counts.
+# Number of runs of each detector's whole chain; the shortest time counts.
 _REPEATS = 3
 
 _WANTED_SHARE = 0.25
@@ -50,7 +50,7 @@ _WANTED_KEPT = 0.8
 
 @dataclass(frozen=True)
 class DetectorCount:
-    """What a detector finds on a pair; `right` are right matches at the ratio of 0.8."""
+    """A detector's results on a pair; `right` counts right matches at the ratio of 0.8."""
 
     name: str
     detector: str
@@ -65,11 +65,11 @@ class DetectorCount:
 
 @dataclass(frozen=True)
 class ChainCount:
-    """Right matches, and all that are left, of three ways to match.
+    """Right matches, and all matches kept, of three ways to match.
 
-    `standard` is SIFT as it is, oriented, at the ratio and with RANSAC; `alone` is upright
-    SIFT-OCT at the same ratio with RANSAC; `hybrid` matches in the gate of a rough shift. So many
-    of these are expected to be right `by_chance`.
+    `standard` is plain, oriented SIFT at the ratio with RANSAC. `alone` is upright SIFT-OCT at the
+    same ratio with RANSAC. `hybrid` matches in the gate of a rough shift; `by_chance` of its right
+    matches are expected to be right by chance.
     """
 
     name: str
@@ -81,7 +81,7 @@ class ChainCount:
 
 @dataclass(frozen=True)
 class TurnCount:
-    """Right matches without a turn and after a quarter turn, at the ratio of 0.8."""
+    """Right matches without and after a quarter turn, at the ratio of 0.8."""
 
     name: str
     gradient: str
@@ -107,12 +107,12 @@ def _right(first: Keypoints, second: Keypoints, limit_px: float) -> np.ndarray:
 
 
 def count_detector(case: RealCase, detector: str) -> DetectorCount:
-    """Count what a detector with its own contrast finds, upright, on a registered pair."""
+    """Count the results of an upright detector with its own contrast on a registered pair."""
     reference, input = registered(case)
     variant = Variant.parse(detector)
     runs = [evaluate(variant, reference, input, RATIO, "kd-tree") for _ in range(_REPEATS)]
     fastest = min(runs, key=lambda run: run.detecting_s + run.matching_s)
-    # Up to 20 % of overlap error are right: six pixels at most, of features that are large.
+    # Up to 20 % of overlap error is right: at most six pixels, for large features.
     return DetectorCount(
         case.name,
         detector,
@@ -160,7 +160,7 @@ def count_chain(case: RealCase) -> ChainCount:
 
 
 def _counts(first: Keypoints, second: Keypoints, model: Model, limit_px: float) -> tuple[int, int]:
-    """Return how many matches that agree with a model are right, and how many agree."""
+    """Return the numbers of right matches and of all matches that agree with a model."""
     kept = distances(model, first.position_px, second.position_px) <= _RANSAC_PX
     return int((_right(first, second, limit_px) & kept).sum()), int(kept.sum())
 
@@ -186,7 +186,7 @@ def count_turn(case: RealCase, gradient: str) -> TurnCount:
 
 
 def detector_table(counts: Sequence[DetectorCount]) -> Table:
-    """Return what the detectors find, as [Suri2010] tables 6.5 to 6.8."""
+    """Return the results of the detectors, as [Suri2010] tables 6.5 to 6.8."""
     head = ("pair", "detector", "features", *(f"repeat {c}" for c in CLASS_NAMES[:2]))
     rows = [
         [
@@ -204,7 +204,7 @@ def detector_table(counts: Sequence[DetectorCount]) -> Table:
 
 
 def chain_table(counts: Sequence[ChainCount]) -> Table:
-    """Return right matches of all ways, as [Suri2010] table 6.11."""
+    """Return the right matches of all ways to match, as [Suri2010] table 6.11."""
     rows = [
         [
             one.name,
@@ -235,7 +235,7 @@ def _share(part: int, whole: int) -> str:
 def goals(
     detectors: Sequence[DetectorCount], chains: Sequence[ChainCount], turns: Sequence[TurnCount]
 ) -> tuple[Goal, ...]:
-    """Return the goals of the claims of [Suri2010] and what was found."""
+    """Return the goals of the claims of [Suri2010], with their results."""
     by = {name: [one for one in detectors if one.detector == name] for name in DETECTORS}
     features = {name: sum(map(sum, (o.detections for o in own))) for name, own in by.items()}
     seconds = {name: sum(one.seconds for one in own) for name, own in by.items()}

@@ -1,4 +1,4 @@
-"""Chips that fused similarity matches, alone and with the support of their neighbours."""
+"""Chips matched by fused similarity, alone and with the support of their neighbours."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ CHIP_PX = 61
 WITHIN_PX = 3.0
 FUSED = "fused"
 SINGLE = ("nmi", "orientation", "edge-strength", "ncc")
-# Chips beside and diagonally opposite each other are neighbours.
+# Chips are neighbours of those beside and diagonally opposite them.
 REACH_PX = 1.5 * SPACING_PX
 
-# A distortion that is no model of degree 1: up to 1.6 px from chip to chip.
+# A distortion beyond any model of degree 1: up to 1.6 px from chip to chip.
 WAVE_PX, WAVE_LENGTH_PX = 2.5, 300.0
 
 # Settings were compared on seeds 1 to 4.
@@ -47,19 +47,19 @@ _REAL, _SIMULATED = "real SAR pairs", "simulated pairs"
 
 @dataclass(frozen=True)
 class FusionShare:
-    """How many chips of a pair a similarity matched.
+    """The share of a pair's chips that one similarity matches.
 
     Parameters
     ----------
     name, group
-        The pair, and with which others it is counted.
+        The pair, and the group it is counted in.
     similarity, chips
-        What was matched how, and how many.
+        The similarity, and the number of chips.
     distorted
         Whether a smooth distortion was injected.
     one_way, alone, supported
-        Share of chips within `WITHIN_PX`: by reference chips in the input, by both ways together,
-        and by both with the support of neighbours.
+        Share of chips within `WITHIN_PX`: reference chips searched for in the input; both
+        directions combined; both directions with the support of neighbours.
     """
 
     name: str
@@ -74,7 +74,7 @@ class FusionShare:
 
 @dataclass(frozen=True)
 class FusionShares:
-    """What all similarities reached on one pair."""
+    """The shares of all similarities on one pair."""
 
     records: tuple[FusionShare, ...]
 
@@ -94,7 +94,7 @@ class FusionCase:
     scene: Scene
 
     def run(self, workers: int | None) -> FusionShares:
-        """Match the chips and compare with the truth."""
+        """Match the chips and compare them with the truth."""
         with (
             tempfile.TemporaryDirectory() as folder,
             threads(workers) as context,
@@ -107,7 +107,7 @@ class FusionCase:
     def share(
         self, pair: OffsetPair, similarity: str, distorted: bool, context: Context
     ) -> FusionShare:
-        """Return how many chips one similarity matched."""
+        """Return the share of chips that one similarity matches."""
         grid = pair.images.grid
         model = pair.nominal(_distorting(pair) if distorted else None)
         centres = chip_centres(grid, CHIP_PX, grid.width * grid.height)
@@ -136,7 +136,7 @@ def wave(px: FloatArray) -> FloatArray:
 
 
 def _distorting(pair: OffsetPair) -> PointFunction:
-    """Return the function from the map to input pixels with the distortion injected."""
+    """Return the function from the map to input pixels, including the injected distortion."""
     grid = pair.images.grid
 
     def to_px(xy: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ def true_shifts(pair: OffsetPair, centres: FloatArray, distorted: bool) -> Float
     shifts = np.broadcast_to(pair.offset_px, centres.shape)
     if not distorted:
         return shifts
-    # The content of position p is shown where q - offset - wave(q) = p.
+    # The input shows the content of position p where q - offset - wave(q) = p.
     found = centres + shifts
     for _ in range(20):
         found = centres + pair.offset_px + wave(found)
@@ -188,7 +188,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(records: Sequence[FusionShare], quick: bool) -> list[Goal]:
-    """Return the suite's goals and what was found."""
+    """Return the suite's goals, with their results."""
     found = []
     for group in (_REAL, _SIMULATED):
         for how, wanted in WANTED.items():

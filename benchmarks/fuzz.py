@@ -4,9 +4,10 @@
     .venv/bin/python -m benchmarks.fuzz --only dem,rpb --cases 500
     .venv/bin/python -m benchmarks.fuzz --case 4711
 
-A case is a number, which gives the file and its damage. Cases run in forked processes with limits
-of time and memory; one that crashes or hangs is counted, and a new process goes on with the next.
-What ends in a crash, a hang, or a traceback is kept in `results/fuzz/`, and the exit code is 1.
+A case is a number that determines the file and its damage. Cases run in forked processes with
+limits of time and memory. A case that crashes or hangs is counted, and a new process continues with
+the next. Files that cause a crash, a hang, a traceback or too much memory are kept in
+`results/fuzz/`, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from .fuzz_mutations import mutate
 
 RESULTS = Path(__file__).with_name("results") / "fuzz"
 
-# What a case may end in; the last four are failures.
+# Outcomes of a case; the last four are failures.
 OK, REFUSED, ERROR, TRACEBACK, CRASH, HANG, MEMORY = (
     "ok", "refused", "error line", "traceback", "crash", "hang", "memory",
 )  # fmt: skip
@@ -58,18 +59,18 @@ _BATCH = 100
 
 @dataclass(frozen=True)
 class Target:
-    """What is damaged, and what reads it.
+    """Files to damage, and the tool that reads them.
 
     Parameters
     ----------
     names
-        Healthy files, of which a case damages one.
+        Healthy files, one of which each case damages.
     arguments
-        Of the command line, with `{}` for the file; or a function of its path.
+        Words of the command line, with `{}` for the file; or a function of the file's path.
     beside
-        Files that belong to it.
+        Files that accompany it.
     weight
-        How often it is chosen.
+        Relative frequency of the target.
     """
 
     names: tuple[str, ...]
@@ -79,7 +80,7 @@ class Target:
 
     @property
     def tool(self) -> str | None:
-        """Name of the tool that reads it; None: a function does."""
+        """Name of the tool that reads the file; None: a function does."""
         if not isinstance(self.arguments, str):
             return None
         return self.arguments.split()[0].replace("-", "_")
@@ -132,7 +133,7 @@ TARGETS = {
         ("geoid.tif",), f"{_ORTHO} --dem dem.tif --geoid {{}}", ("sensor.tif", "dem.tif")
     ),
     "classifier": Target(("classifier.json",), _decide),
-    # A process each: these take longer.
+    # These take longer, as each starts a process of its own.
     "gpkg": Target(("points.gpkg",), f"{_WARP} {{}}", ("image.tif",), 0.25),
     "areas": Target(("areas.gpkg", "areas.geojson"), _mask, ("image.tif",), 0.25),
 }
@@ -150,7 +151,7 @@ class Case:
 
     @classmethod
     def of(cls, number: int, seeds: Path, only: Sequence[str]) -> Case:
-        """Return the case of a number."""
+        """Return the case with a number."""
         random = np.random.default_rng(number)
         weights = np.array([TARGETS[name].weight for name in only])
         target = str(random.choice(only, p=weights / weights.sum()))
@@ -160,13 +161,13 @@ class Case:
         return cls(number, target, name, mutate(content, random, is_text=is_text))
 
     def write(self, seeds: Path, folder: Path) -> None:
-        """Write the file, and healthy ones beside it, into a folder."""
+        """Write the damaged file, and its healthy companions, into a folder."""
         for name in TARGETS[self.target].beside:
             shutil.copyfile(seeds / name, folder / name)
         (folder / self.name).write_bytes(self.content)
 
     def run(self, folder: Path) -> str:
-        """Return what the case ends in, in this process; a traceback goes to standard error."""
+        """Run the case in this process, return its outcome; a traceback goes to standard error."""
         arguments = TARGETS[self.target].arguments
         try:
             if not isinstance(arguments, str):
@@ -188,8 +189,8 @@ def run_cases(
     keep: Path | None = None,
     patience_s: float = _PATIENCE_S,
 ) -> Iterator[tuple[int, str, str]]:
-    """Yield number, target and outcome of each case; `keep` receives the files of failures."""
-    # Before a process is forked, so that none imports them again.
+    """Yield number, target and outcome of each case; the files of failures go to `keep`."""
+    # Imported before any process is forked, so that none imports them again.
     for tool in {TARGETS[name].tool for name in only} - {None}:
         load_tool(tool)
     waiting = list(numbers)

@@ -1,4 +1,4 @@
-"""Small healthy files of every kind that GroundTie reads: what `fuzz` damages."""
+"""Small healthy files of every kind that GroundTie reads, for `fuzz` to damage."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _write_images(folder: Path) -> None:
         _write(folder / "masked.tif", image[:1])
         with rasterio.open(folder / "masked.tif", "r+") as dataset:
             dataset.write_mask(image[1] > 20)
-    # An image with files beside it: mask, overviews, metadata.
+    # An image with companion files: mask, overviews, metadata.
     _write(folder / "beside.tif", image[0])
     with (
         rasterio.Env(TIFF_USE_OVR=True, GDAL_TIFF_INTERNAL_MASK=False),
@@ -119,7 +119,7 @@ def _write_sensor(folder: Path) -> None:
     size = SIDE / 2
     scale = (10 * size / 78_400, 10 * size / 111_195, 400.0)
     numerators = np.zeros((2, TERMS))
-    # Columns run east, rows south; heights lean over.
+    # Columns run east, rows south; heights cause relief displacement.
     numerators[0, [1, 3]], numerators[1, [2, 3]] = (1.0, 0.1), (-1.0, 0.05)
     one = (1.0, *[0.0] * (TERMS - 1))
     middle = (size - 0.5, size - 0.5)

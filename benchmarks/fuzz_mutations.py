@@ -1,4 +1,4 @@
-"""Damage to files: bytes for binary files, words and structure for text."""
+"""Damage to files: to bytes of binary files, to words and structure of text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 Random = np.random.Generator
 
-# Binary files hold what they state of themselves mostly at their beginning.
+# The headers of binary files lie mostly at their beginning.
 _HEADER = 700
 
 _NASTY_NUMBERS = (
@@ -27,7 +27,7 @@ _WORD = re.compile(rb"[A-Za-z_][\w.]*")
 
 
 def mutate(content: bytes, random: Random, *, is_text: bool) -> bytes:
-    """Return content with one to four damages; the fewer, the farther a reader gets."""
+    """Return content with one to four damages; with fewer of them, a reader gets farther."""
     ways = _TEXT_WAYS if is_text else _BYTE_WAYS
     for _ in range(int(random.choice([1, 1, 1, 2, 4]))):
         if content:
@@ -86,7 +86,7 @@ def _swap_word(pattern: re.Pattern[bytes], by: tuple[bytes, ...]) -> Callable[..
 
 
 def _lines(content: bytes, random: Random) -> bytes:
-    """Take a line (or element, or field) out, double it, or move it."""
+    """Remove, duplicate or move a line, element or field."""
     separator = next((s for s in (b"\n", b"><", b",") if content.count(s) > 3), b" ")
     lines = content.split(separator)
     at = int(random.integers(len(lines)))

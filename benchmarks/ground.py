@@ -1,4 +1,4 @@
-"""How much of a simulated city's ground `mask-ground` finds, and how much of that is ground."""
+"""Recall and precision of `mask-ground` on the ground of simulated cities."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .suites import Goal, Settings, SuiteResult, Table
 
 @dataclass(frozen=True)
 class FoundGround:
-    """A mask against the ground that ray casting finds in the simulator's heights.
+    """A mask compared with the ground that ray casting finds in the simulator's heights.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ class FoundGround:
     share
         Share of the image that the mask keeps.
     radar_precision
-        Share of the mask that is ground which the radar shows, neither laid over nor in its shadow.
+        Share of the mask that is ground visible to the radar, free of layover and radar shadow.
     precision, recall
-        Share of the mask that is ground which both images show, out of cast shadow; share of this
-        ground that the mask keeps.
+        Precision: share of the mask that is ground visible in both images, outside cast shadow.
+        Recall: share of this ground that the mask keeps.
     """
 
     seed: int
@@ -47,7 +47,7 @@ class FoundGround:
 
     @classmethod
     def of(cls, seed: int, mask: Mask, radar: Mask, both: Mask) -> FoundGround:
-        """Compare a mask with the ground that the radar shows, and that both images show."""
+        """Compare a mask with the ground visible to the radar, and visible in both images."""
         return cls(
             seed,
             float(mask.mean()),
@@ -77,7 +77,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def of_seed(seed: int, cache: Path) -> FoundGround:
-    """Return what the mask that `coregister` makes of a city finds."""
+    """Return the mask that `coregister` makes of a city, compared with the ground."""
     pair = city(seed).pair(cache)
     views = [View.of(path, None) for path in (pair.reference, pair.input)]
     with ExitStack() as stack:
@@ -100,7 +100,7 @@ def of_seed(seed: int, cache: Path) -> FoundGround:
 
 
 def goal(found: Sequence[FoundGround]) -> Goal:
-    """Return the medians of all cities."""
+    """Return the goal on the medians of all cities."""
     precision, recall = (
         float(np.median([getattr(f, name) for f in found])) for name in ("precision", "recall")
     )

@@ -23,7 +23,7 @@ from .suites import Goal, Settings, SuiteResult, Table
 
 STATE = Path(__file__).with_suffix(".json")
 
-# What is slower or larger than this is reported. Repeated runs of one state differ by less.
+# Factor beyond which a cost is reported. Repeated runs of one state differ by less.
 TOLERANCE = 1.15
 
 _TIMES = 3
@@ -41,7 +41,7 @@ _DATUM = ("--dem-datum", "ellipsoidal")
 
 @dataclass(frozen=True)
 class Cost:
-    """Processor time of a job, in yardsticks, and its peak memory."""
+    """Processor time of a job, in yardsticks, and peak memory."""
 
     yardsticks: float
     peak_mb: float
@@ -66,7 +66,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(found: Mapping[str, Cost], before: Mapping[str, Cost]) -> list[Goal]:
-    """Return a goal for each job that the committed state has."""
+    """Return a goal for each job of the committed state."""
     return [
         Goal(
             job,
@@ -94,7 +94,7 @@ def _columns(cost: Cost | None) -> list[str]:
 
 
 def costs(settings: Settings, times: int) -> dict[str, Cost]:
-    """Return what each job costs, its yardstick run beside it."""
+    """Return the cost of each job; the yardstick is run beside it."""
     with tempfile.TemporaryDirectory() as folder:
         found = {}
         for job, words in jobs(settings, Path(folder)).items():
@@ -114,7 +114,7 @@ def _measured(words: list[str]) -> Measured:
 
 
 def jobs(settings: Settings, folder: Path) -> dict[str, list[str]]:
-    """Return the words of the command line of each job; their inputs are made."""
+    """Return the command-line words of each job; the inputs are made here."""
     small, large, open_land = (
         Simulation(size, density, _SEED).pair(settings.cache)
         for size, density in ((500, "rural"), (1000, "suburban"), (1000, "rural"))
@@ -149,12 +149,12 @@ def jobs(settings: Settings, folder: Path) -> dict[str, list[str]]:
 
 
 def read_state() -> dict[str, Cost]:
-    """Return the committed costs of the last state."""
+    """Return the committed costs."""
     return {job: Cost(**cost) for job, cost in json.loads(STATE.read_text()).items()}
 
 
 def main() -> None:
-    """Write the costs of today."""
+    """Write the current costs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--update", action="store_true", required=True, help="write the state")
     parser.parse_args()

@@ -1,8 +1,8 @@
 """Half-real sensor images: a real optical image as a real sensor model would have seen it.
 
-The optical image of a real SAR–optical pair is projected into a sensor image by the RPCs of a
-real Pléiades image, over a made-up terrain; the SAR image stays on the map as it is. Radiometry is
-real, geometry is known.
+The optical image of a real SAR–optical pair is projected into a sensor image over synthetic
+terrain, by the RPCs of a real Pléiades image; the SAR image stays on the map. The radiometry is
+thus real, and the geometry is known.
 """
 
 from __future__ import annotations
@@ -47,20 +47,20 @@ _MARGIN_PX = 60
 
 @dataclass(frozen=True)
 class SensorScene:
-    """Files of a sensor image with biased RPCs, and what is true.
+    """Files of a sensor image with biased RPCs, and the truth.
 
     Parameters
     ----------
     image, reference, dem
         The files; heights are ellipsoidal.
     truth
-        The RPCs that the image was made by.
+        The RPCs by which the image was made.
     delivered
-        Those that it has.
+        The biased RPCs that are delivered with it.
     size
         Width and height of the image.
     sigma_px
-        How far the truth can be believed, in image pixels.
+        Uncertainty of the truth, in image pixels.
     """
 
     image: Path
@@ -72,7 +72,7 @@ class SensorScene:
     sigma_px: float
 
     def error_px(self, rpc: RPC) -> float:
-        """Return the RMSE of RPCs all over the image, in image pixels."""
+        """Return the RMSE of RPCs over the whole image, in image pixels."""
         cols, rows = np.meshgrid(*(np.linspace(0, side - 1, 15) for side in self.size))
         px = np.column_stack([cols.ravel(), rows.ravel()])
         height = self.truth.offset[2]
@@ -81,7 +81,7 @@ class SensorScene:
 
 
 def bias_of(number: int, size: tuple[int, int]) -> Bias:
-    """Return one of the biases: shifts in all directions to 50 px; every second one drifts."""
+    """Return one of the biases: shifts in all directions to 50 px, every second with a drift."""
     random = np.random.default_rng(100 + number)
     angle = 2 * np.pi * (number + random.random()) / BIASES
     length = LARGEST_SHIFT_PX * (number + 1) / BIASES
@@ -116,13 +116,13 @@ def make_scene(
     case
         The real pair.
     sensor
-        RPCs of a real image; the scene lies in the middle of it.
+        RPCs of a real image, in whose middle the scene lies.
     number
-        Which bias.
+        Number of the bias.
     folder
         Where the files are written.
     datum_error_m
-        What is added to the terrain model that is handed out.
+        Height offset of the delivered terrain model.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with rasterio.open(case.reference) as dataset:
@@ -160,14 +160,14 @@ def make_scene(
 
 
 def _pixel_size_m(rpc: RPC) -> float:
-    """Return the side of an image pixel on the ground in the middle of RPCs."""
+    """Return the side of an image pixel on the ground, at the centre of the RPCs."""
     slopes = rpc.derivatives([rpc.offset[:2]], rpc.offset[2])[0, :, :2]
     metres = 111_195.0 * np.array([np.cos(np.deg2rad(rpc.offset[1])), 1.0])
     return float(np.sqrt(1 / abs(np.linalg.det(slopes / metres))))
 
 
 def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> Path:
-    """Write hills around a height, over a grid and a margin."""
+    """Write hills around a height, over a grid with a margin."""
     reach = 3 * _RELIEF_M + 200.0
     left, top = grid.transform.c, grid.transform.f
     cols = int((grid.width * grid.transform.a + 2 * reach) / _DEM_PIXEL_M) + 2

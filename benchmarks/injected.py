@@ -1,4 +1,4 @@
-"""Windows of one image in a known pose: cut out of it, once turned, scaled and shifted."""
+"""Windows of one image in a known relative pose: rotation, scale and shift."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from groundtie.rasters.patch import Patch
 
 Image = NDArray[np.float32]
 
-# What becomes of the corners of the input that the reference's window does not fill: the input
-# shows more of the ground; they are black and masked; they are black and unmasked ([Patel2017]).
+# The input's corners that the reference's window does not cover: more of the ground; black and
+# masked; black and unmasked ([Patel2017]).
 WHOLE = "whole"
 MASKED = "black corners, masked"
 BLACK = "black corners"
@@ -25,18 +25,18 @@ CORNERS = (WHOLE, MASKED, BLACK)
 
 @dataclass(frozen=True)
 class Injection:
-    """A pose that is put between two windows of an image, and what spoils them.
+    """A pose between two windows of an image, and the degradations.
 
     Parameters
     ----------
     pose
-        How the input lies against the reference.
+        Pose of the input relative to the reference.
     corners
         One of `CORNERS`.
     noise_variance
-        Variance of Gaussian noise that is added to both, grey values being 0 to 1.
+        Variance of the Gaussian noise that is added to both, for grey values 0 to 1.
     seed
-        Of the noise.
+        Seed of the noise.
     """
 
     pose: Pose
@@ -45,7 +45,7 @@ class Injection:
     seed: int = 0
 
     def windows(self, image: Image, shape: tuple[int, int]) -> tuple[Patch, Patch]:
-        """Return reference and input; the reference is the middle of the image, not resampled.
+        """Return reference and input; the reference is the middle of the image, without resampling.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class Injection:
         )
         finest = self.pose.scale
         if finest < 1:
-            # What the input's larger pixels cannot show.
+            # Remove the detail that the input's larger pixels cannot resolve.
             image = gaussian_filter(image, 0.5 * np.sqrt(1 / finest**2 - 1))
         low, high = (0, 0), image.shape[::-1]
         if self.corners != WHOLE:
@@ -89,16 +89,16 @@ class Injection:
 
 
 def unit_range(bands: NDArray[np.generic]) -> Image:
-    """Return the mean of bands, shape (bands, h, w), from 0 to 1; extremes are cut off."""
+    """Return the mean of bands, shape (bands, h, w), scaled to 0 to 1 with clipped extremes."""
     grey = bands.astype(np.float32).mean(axis=0)
     low, high = np.percentile(grey, (0.1, 99.9))
     return np.clip((grey - low) / (high - low), 0, 1).astype(np.float32)
 
 
 def pose_errors(found: Pose, truth: Pose, shape: Sequence[int]) -> tuple[float, float]:
-    """Return the error of the rotation in degrees, and the root mean square one in pixels.
+    """Return the error of the rotation in degrees, and the root mean square error in pixels.
 
-    The latter is over a whole reference of a shape, in its pixels.
+    The latter is taken over a whole reference of the given shape, in its pixels.
     """
     turned = abs((found.rotation_deg - truth.rotation_deg + 180) % 360 - 180)
     sides = [np.linspace(-0.5, 0.5, 21) * n for n in shape[::-1]]

@@ -1,6 +1,6 @@
-"""What chips cost: joint histograms by each way of counting, and similarity by stacks' sizes.
+"""Cost of chips: joint histograms by each way of counting, and similarity by stack size.
 
-The constants of `joint_histogram`, and the size of stacks of `chip_windows`.
+It determines the constants of `joint_histogram`, and the stack size of `chip_windows`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from .suites import Settings, SuiteResult, Table
 _CHIPS_PX, _RADII_PX, _BINS = (40, 64, 80, 112), (9, 13, 25), (8, 12)
 _TIMES = 7
 
-# So many stacks are matched in each thread.
+# Number of stacks that each thread matches.
 _STACKS = 4
 
-# Chips of the fit, of a level of the pyramid and of the survey, and how far they are searched.
+# Chip side and search radius of the fit, of a pyramid level and of the survey; stack sizes.
 _SEARCHES_PX, _STACKED_PIXELS = ((58, 8), (80, 12), (64, 24)), (1, 2**15, 2**16, 2**17, 2**18)
 
 
@@ -112,7 +112,7 @@ def _costs(chip_px: int, radius_px: int, bins: int) -> dict[str, float]:
 
 
 def _seconds(work: Callable[[], object], clock: Callable[[], float] = time.thread_time) -> float:
-    """Return the time for work, by default of this thread's processor, the least."""
+    """Return the shortest time for work, by default this thread's processor time."""
     seconds = []
     for _ in range(_TIMES):
         started = clock()

@@ -1,4 +1,4 @@
-"""Time and memory of `coregister` from 2000² to 30 000² pixels: what grows with the scene.
+"""Time and memory of `coregister` from 2000² to 30 000² pixels, and how they grow.
 
 The largest pair and its result take 15 GB of disk in the folder of temporary files.
 """
@@ -24,25 +24,25 @@ from .suites import Goal, Settings, SuiteResult, Table
 
 SIZES, QUICK_SIZES = (2000, 10_000, 30_000), (1000, 2000)
 
-# For the largest: by the clock of a machine with two processors that does nothing else.
+# For the largest pair: wall-clock time on an otherwise idle machine with two processors.
 LARGEST_SECONDS, LARGEST_BYTES = 300.0, 1.2e9
 
-# Time grows with pixels to this power.
+# Largest exponent of the growth of time with the number of pixels.
 LARGEST_EXPONENT = 1.05
 
 
 @dataclass(frozen=True)
 class Run:
-    """A registration of a pair of some size.
+    """One registration of a pair of a certain size.
 
     Parameters
     ----------
     size
         Width and height, in pixels.
     seconds, processor_seconds, peak_bytes
-        Of the whole process, start, imports and written output included.
+        Of the whole process, including start, imports and written output.
     verdict, error_px
-        What it was against the truth.
+        Verdict and error against the truth.
     """
 
     size: int
@@ -71,7 +71,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def register(pair: Pair, size: int) -> Run:
-    """Register a pair, and judge and measure it."""
+    """Register a pair, judge the result, and measure the process."""
     found = measure(own_command(pair))
     values = json.loads(found.output)
     verdict, error = REFUSED, None
@@ -84,13 +84,13 @@ def register(pair: Pair, size: int) -> Run:
 
 
 def exponent(runs: Sequence[Run]) -> float:
-    """Return the power of pixels that processor time grows with: the slope of the logarithms."""
+    """Return the exponent of processor time as a power of pixels: the slope of the logarithms."""
     pixels = [2 * np.log(one.size) for one in runs]
     return float(np.polyfit(pixels, np.log([one.processor_seconds for one in runs]), 1)[0])
 
 
 def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:
-    """Return the goals, which count where all sizes were measured."""
+    """Return the goals, which count only if all sizes were measured."""
     largest, grown = runs[-1], exponent(runs)
     name = f"{largest.size}² px"
     correct = sum(one.verdict == CORRECT for one in runs)
@@ -108,7 +108,7 @@ def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:
 
 
 def table(runs: Sequence[Run]) -> Table:
-    """Return what was measured."""
+    """Return the measurements."""
     head = ("pixels", "s", "s of processors", "µs of processors a pixel", "peak MB", "result")
     rows = [
         [

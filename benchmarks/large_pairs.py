@@ -1,8 +1,8 @@
-"""Pairs of any size out of one simulated square, laid side by side in files of their own.
+"""Pairs of any size, made by repeating one simulated square in files of their own.
 
-The square's images lie exactly on each other. What is wrong is the georeferencing of the input, so
-that no pixel is resampled and the truth is exact: each pixel of the input shows the ground of the
-same pixel of the reference.
+The square's images are exactly aligned; only the georeferencing of the input is wrong. No pixel is
+resampled, and the truth is exact: each pixel of the input shows the ground of the same pixel of the
+reference.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .simulations import Simulation
 TILE_PX = 5000
 _SEED = 1
 
-# What the georeferencing of the input is wrong by: a shift, and as much more at the borders.
+# Error of the input's georeferencing: a shift, and a linear part that reaches this at the borders.
 _SHIFT_PX = (5.0, -6.0)
 _WARP_PX = 3.0
 
@@ -31,7 +31,7 @@ _BLOCK_PX = 512
 
 
 def tile_pair(cache: Path) -> Pair:
-    """Return the square that larger pairs are made of; it takes a minute unless `cache` has it."""
+    """Return the square that larger pairs repeat; it takes a minute to make unless in `cache`."""
     exact = (("distortion", "shift"),)
     return Simulation(TILE_PX, "rural", _SEED, 0.0, exact).pair(cache)
 
@@ -46,9 +46,9 @@ def large_pair(tile: Pair, size: int, folder: Path) -> Pair:
 
 
 def wrong(size: int) -> Affine:
-    """Return what takes corners of the input's pixels to where it claims them to be.
+    """Return the map from the true corners of the input's pixels to their stated positions.
 
-    Both count pixels of the reference from its first corner, as geotransforms do.
+    Both are in pixels of the reference from its first corner, as in geotransforms.
     """
     centre, rise = size / 2, _WARP_PX / (size / 2)
     around = Affine(1 + rise, -rise, 0, rise, 1 - rise, 0)
@@ -57,7 +57,7 @@ def wrong(size: int) -> Affine:
 
 
 def repeat(source: Path, target: Path, size: int, moved: Affine) -> None:
-    """Write a raster of `size`² pixels that repeats another one, strip by strip.
+    """Write a raster of `size`² pixels that repeats another raster, strip by strip.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def repeat(source: Path, target: Path, size: int, moved: Affine) -> None:
     size
         Width and height in pixels.
     moved
-        What its georeferencing is wrong by; see `wrong`.
+        Error of its georeferencing; see `wrong`.
     """
     with rasterio.open(source) as raster:
         image, profile = raster.read(), raster.profile

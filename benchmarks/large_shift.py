@@ -23,8 +23,8 @@ SIMULATED_SHIFT_PX = 500.0
 SIMULATED_SIZE_PX = 4000
 SIMULATED_SEEDS = 2
 
-# Real pairs must keep so much common ground, on both axes, that the largest shift leaves
-# something to match.
+# Common ground of real pairs, on both axes, that must remain at the largest shift, so that there
+# is something to match.
 _COMMON_PX = 300
 
 _SIMULATED = "simulated"
@@ -32,13 +32,13 @@ _SIMULATED = "simulated"
 
 @dataclass(frozen=True)
 class FarSimulation:
-    """A simulated pair that is far off."""
+    """A simulated pair with a large initial error."""
 
     simulation: Simulation
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair = self.simulation.pair(self.cache)
         radius = math.ceil(self.simulation.shift) + 10.0  # and the simulated warp
         return attempt(self.simulation.name, _SIMULATED, pair, workers, search_radius=radius)
@@ -90,7 +90,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(group: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals for one group and what was found."""
+    """Return the goals for one group, with their results."""
     found, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
     right = found + refused
     return (

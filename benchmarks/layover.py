@@ -1,7 +1,7 @@
-"""How far layover and lean draw the similarity of whole scenes away from the ground.
+"""How far layover and relief displacement draw the similarity of whole scenes off the ground.
 
-And of what is taken for the ground alone: by grey levels and by classes of colour, with and without
-its darkest pixels, which are radar shadow. Directions that are inferred from the images, too.
+The same for the supposed ground alone, by grey levels and by colour classes, with its darkest
+pixels, which are radar shadow, and without. Also the errors of directions inferred from the images.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ from .suites import Settings, SuiteResult, Table, run_cases
 SIMILARITIES = ("nmi", "orientation", "fused")
 RADIUS_PX = 40
 
-# The ground alone, and whether it is matched by colours.
+# The ground alone; whether it is matched by colours.
 GROUND = {"ground, grey levels": False, "ground, colours": True}
 _GROUND_RADIUS_PX, _GROUND_CHIP_PX = 10, 80
 
-# How directions of shadows are inferred: outer percentages of the histogram, farthest pixels.
+# Inference of shadow directions: outer percentages of the histogram, farthest pixels.
 _SHADOWS = 15.0, 14
 
-# Where the search of the ground starts, right and down of the truth, and how often it is repeated,
-# as its joint histogram gets the better the nearer it is.
+# Start of the search on the ground, right and down of the truth; and the number of rounds, as its
+# joint histogram improves with every round.
 _START_PX, _ROUNDS = (2.0, 2.0), 3
 _CHIP_PX = 901
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Where a whole scene's similarity peaks, though its images lie as they should."""
+    """The peak of a whole scene's similarity where the images are aligned."""
 
     seed: int
     similarity: str
@@ -61,24 +61,24 @@ class Drawn:
 
     @property
     def error_px(self) -> float:
-        """How far the peak is from the truth."""
+        """Distance of the peak from the truth."""
         return math.hypot(self.right_px, self.down_px)
 
     @property
     def along_px(self) -> float:
-        """How far it is along the line that heights displace along: no more than the error."""
+        """Its component along the line of relief displacement: at most the error."""
         right, down = height_line(self.seed)
         return abs(self.right_px * right + self.down_px * down)
 
     @property
     def across_px(self) -> float:
-        """How far it is across that line, where heights displace nothing."""
+        """Its component across that line, where heights displace nothing."""
         return math.sqrt(max(self.error_px**2 - self.along_px**2, 0.0))
 
 
 @dataclass(frozen=True)
 class Directions:
-    """By how many degrees directions are off that are inferred from images."""
+    """Errors in degrees of directions inferred from the images."""
 
     range_deg: float
     sun_deg: float
@@ -105,7 +105,7 @@ class LayoverCase:
     cache: Path
 
     def run(self, workers: int | None) -> Peaks:
-        """Make the pair if need be and find the peaks."""
+        """Make the pair if needed, and find the peaks."""
         pair = aligned_city(self.seed).pair(self.cache)
         records = []
         with tempfile.TemporaryDirectory() as folder:
@@ -125,7 +125,7 @@ class LayoverCase:
 
 
 def of_ground(seed: int, pair: Pair) -> tuple[list[Drawn], Directions]:
-    """Return where the ground of a city without misregistration peaks, and what directions show."""
+    """Return the peaks on a city's ground without misregistration, and the errors of directions."""
     found = []
     with ExitStack() as stack:
         context = stack.enter_context(threads(1))
@@ -161,16 +161,16 @@ def _apart_deg(one: float, other: float) -> float:
 
 
 def aligned_city(seed: int) -> Simulation:
-    """Return the city of a seed, seen from where `city` is, its ground registered."""
+    """Return the city of a seed with the views of `city`, but with its ground aligned."""
     made = city(seed)
     return replace(made, shift=0.0, further=(*made.further, ("distortion", "shift")))
 
 
 def height_line(seed: int) -> tuple[float, float]:
-    """Return the direction (right, down) of roofs between the images of a city, of length 1.
+    """Return the unit vector (right, down) along which roofs are displaced between a city's images.
 
-    Layover by h / tan(incidence) towards the radar, relief displacement by h · tan(off-nadir angle)
-    away from the camera.
+    Layover displaces them by h / tan(incidence) towards the radar, relief displacement by
+    h · tan(off-nadir angle) away from the camera.
     """
     view: dict[str, Any] = dict(city(seed).further)
     towards_radar = -1.0 if view["orbit"] == "ascending" else 1.0
@@ -200,7 +200,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def peaks_table(records: Sequence[Drawn]) -> Table:
-    """Return a table of how far the peaks are from the truth."""
+    """Return a table of the distances of the peaks from the truth."""
     head = (
         "similarity",
         "median (px)",
@@ -226,7 +226,7 @@ def peaks_table(records: Sequence[Drawn]) -> Table:
 
 
 def directions_table(directions: Sequence[Directions]) -> Table:
-    """Return a table of how far inferred directions are off."""
+    """Return a table of the errors of inferred directions."""
     head = ("direction inferred from", "median (°)", "largest (°)", "seeds")
     rows = []
     for name, of in (

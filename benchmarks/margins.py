@@ -1,7 +1,7 @@
-"""How near right and wrong transforms come to the limits of the rules on the survey.
+"""Margins of right and wrong transforms against the limits of the rules on the survey.
 
-Whatever the verdict is, a transform that was found is right or wrong by the truth. What the survey
-measures of both kinds gives the limits: this suite is their source.
+The truth shows whether a transform is right, whatever the verdict. The limits of the rules derive
+from the survey's statistics of right and wrong transforms: this suite is their source.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from .pipeline_runs import found_by
 from .real import LARGEST_SHIFT_PX
 from .suites import Settings, SuiteResult, Table, run_cases
 
-# By tool.
+# Specification by tool.
 _SPECIFICATIONS = {"coregister": COREGISTER, "match_sar_sar": SAR_SAR, "match_optical": OPTICAL}
 
 _QUICK, _SAMPLE = 10, 200
@@ -57,7 +57,7 @@ _PERCENT = (0, 5, 50, 95, 100)
 
 @dataclass(frozen=True)
 class Statistic:
-    """What a rule compares with its limit: too large, or too small, it refuses."""
+    """A statistic that a rule compares with its limit, which is an upper or a lower one."""
 
     name: str
     limit: float
@@ -66,13 +66,13 @@ class Statistic:
 
 
 def _excess(survey: Survey) -> float:
-    """Return the excess of the most evident part, evident or not; NaN: there are too few chips."""
+    """Return the excess of the most evident part, evident or not; NaN: too few chips."""
     parts = find_parts(survey.grid, survey.centres, survey.surfaces, -math.inf)
     return next((part.excess for part in parts), math.nan)
 
 
 def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:
-    """Return what is left without content that may be drawn; None: there is none."""
+    """Return what remains without possibly drawn content; None: no such content."""
     rest = evidence.surveys.rest
     return None if rest is None or not rest.shared.is_evident else rest
 
@@ -101,7 +101,7 @@ def _rest_peak(evidence: RegistrationEvidence) -> float:
 
 
 def _off_drawn(evidence: RegistrationEvidence) -> float:
-    """Return how far from what moves drawn content two cameras' images are moved."""
+    """Return how far the movement of two camera images is from that of drawn content."""
     rest = _without_drawn(evidence)
     if rest is None or rest.shared.sensors is not Sensors.CAMERAS:
         return math.nan
@@ -109,7 +109,7 @@ def _off_drawn(evidence: RegistrationEvidence) -> float:
 
 
 def _moved_ground(evidence: RegistrationEvidence) -> float:
-    """Return how much of what is left varies alike, of images that are moved as ground is."""
+    """Return the share of the rest that varies alike, of images that move as ground does."""
     rest, is_moved = _without_drawn(evidence), _off_drawn(evidence) > 1
     return rest.shared.sameness.ground if rest is not None and is_moved else math.nan
 
@@ -148,18 +148,18 @@ STATISTICS = (
 
 @dataclass(frozen=True)
 class Margins:
-    """What the survey of one transform measured.
+    """The survey's statistics of one transform.
 
     Parameters
     ----------
     name
-        Which case.
+        The case.
     error_px, is_right
         Error of the transform, and whether it is right, whatever the verdict is.
     rules
-        Names of all rules that refuse it, the one that decides first.
+        Names of all rules that refuse it, the deciding one first.
     values
-        A value for each of `STATISTICS`; NaN: there is none.
+        A value for each of `STATISTICS`; NaN: none.
     """
 
     name: str
@@ -169,7 +169,7 @@ class Margins:
     values: tuple[float, ...]
 
     def record(self) -> dict[str, Any]:
-        """Return what was measured as values that JSON can carry."""
+        """Return the measurements as values that JSON can carry."""
         names = [statistic.name for statistic in STATISTICS]
         return plain(
             {
@@ -182,7 +182,7 @@ class Margins:
         )
 
     def line(self) -> str:
-        """Return what was measured as a line of text."""
+        """Return the measurements as a line of text."""
         kind = "right" if self.is_right else "wrong"
         values = ", ".join(f"{value:.1f}" for value in self.values)
         return f"{self.name}: {kind} ({self.error_px:.1f} px), {values}; {', '.join(self.rules)}"
@@ -190,7 +190,7 @@ class Margins:
 
 @dataclass(frozen=True)
 class AttackedPair:
-    """A pair of the red team; controls are among them."""
+    """A pair of the red team, possibly a control."""
 
     case: AttackCase
 
@@ -222,7 +222,7 @@ class RealPair:
             error_px = math.inf
             if found.transform is not None and pair.truth is not None:
                 error_px = pair.truth.error_px(on_pixels(found.transform, pair.reference))
-            # Rules may read the images, which are gone with the folder.
+            # Measured here, as rules may read the images, which vanish with the folder.
             return _measured(self.case.name, found, error_px, pair.sigma_px)
 
 
@@ -233,14 +233,14 @@ def _measured(name: str, found: Registration, error_px: float, sigma_px: float) 
     evidence = found.evidence
     values = _NOTHING if evidence is None else tuple(one.of(evidence) for one in STATISTICS)
     is_right = error_px <= SILENTLY_WRONG_PX + sigma_px
-    # A search that came to no transform has no evidence of one: its verdict names its only rule.
+    # A search without a transform has no evidence about one; its verdict names its only rule.
     decided = (found.verdict.rule,) if found.verdict.rule else ()
     rules = decided if evidence is None else tuple(rule.name for rule, _ in refusals(evidence))
     return Margins(name, error_px, is_right, rules, values)
 
 
 def run(settings: Settings) -> SuiteResult:
-    """Run the suite: `--sample` attacks of `--classes`, or those of a `--case`; and real pairs."""
+    """Run on `--sample` attacks of `--classes` and on real pairs, or on a `--case` alone."""
     wanted = _QUICK if settings.quick else settings.sample or _SAMPLE
     attacks = choose(replace(settings, quick=False, sample=wanted), _SPECIFICATIONS)
     chosen = [AttackedPair(case) for case in attacks]
@@ -263,7 +263,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table:
-    """Return how a statistic is distributed among right and wrong transforms."""
+    """Return the distribution of a statistic among right and wrong transforms."""
     rows = []
     for kind, is_right in (("right", True), ("wrong", False)):
         of_kind = [one for one in found if one.is_right is is_right]
@@ -278,9 +278,9 @@ def _table(number: int, statistic: Statistic, found: Sequence[Margins]) -> Table
 
 
 def rules_table(found: Sequence[Margins]) -> Table:
-    """Return how often each rule refuses wrong and right transforms, and how often no other does.
+    """Return how often each rule refuses wrong and right transforms, and how often alone.
 
-    A rule that refuses nothing wrong alone can go without making anything pass.
+    A rule that never refuses a wrong transform alone can be removed without letting any pass.
     """
     rows = []
     for name in sorted({rule for one in found for rule in one.rules}):

@@ -1,6 +1,6 @@
-"""One shift of a whole dense city, as in [Suri2010]: what masks of the radar image change.
+"""One shift of a whole dense city, as in [Suri2010]: the effect of masks of the radar image.
 
-The input is resampled by the truth, so that every peak away from 0 is an error on the ground.
+The input is resampled by the truth, so that every peak off 0 is an error on the ground.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from .attempt import Pair
 from .city import city
 from .suites import Goal, Settings, SuiteResult, Table
 
-# [Suri2010] searched 20 m around where the images were expected to meet.
+# [Suri2010] searched 20 m around the expected shift.
 RADIUS_PX = 20
 SIMILARITIES = ("nmi", "orientation", "fused")
 PLAIN = "no mask"
 
 
 def by_threshold(percent: float) -> Callable[[Scene], Select]:
-    """Return what masks the brightest percent of a scene."""
+    """Return a mask of the brightest percent, as a function of the scene."""
     return lambda scene: ThresholdMask.of(scene, percent).select
 
 
 def by_regions(width_m: float) -> Callable[[Scene], Select]:
-    """Return what masks all of a scene but regions on the ground."""
+    """Return a mask of all but regions on the ground, as a function of the scene."""
     return lambda scene: find_regions(scene, width_m).select
 
 
@@ -55,7 +55,7 @@ MASKS: dict[str, Callable[[Scene], Select] | None] = {
 
 @dataclass(frozen=True)
 class Found:
-    """How far the peak of a similarity lies from the ground truth, in pixels (right, down)."""
+    """Offset of a similarity's peak from the ground truth, in pixels (right, down)."""
 
     seed: int
     mask: str
@@ -119,7 +119,7 @@ def of_seed(seed: int, cache: Path) -> list[Found]:
 
 
 def opened(pair: Pair, stack: ExitStack) -> ImagePair:
-    """Return the images of a pair, open as long as a stack."""
+    """Return the images of a pair; the stack keeps them open."""
     paths = pair.reference, pair.input
     return make_pair(*(Image(stack.enter_context(open_raster(path))) for path in paths))
 

@@ -31,7 +31,7 @@ from .offsets import OffsetPair, Scene, open_offset
 LIMITS_PX = (5.0, 1.5)
 BEST = 20
 
-# The strongest features that are matched.
+# Number of features that are matched: the strongest ones.
 MOST_FEATURES = 2000
 
 METHODS: dict[str, tuple[Detecting, Describing]] = {
@@ -42,26 +42,26 @@ METHODS: dict[str, tuple[Detecting, Describing]] = {
     "SIFT + HOG-81": (SiftDetector(), HogDescriptor(9)),
 }
 
-# Shift between the images, in pixels: it is not told to the matching.
+# Shift between the images in pixels, unknown to the matching.
 _OFFSET_PX = np.array([3.0, -2.0])
 
 
 @dataclass(frozen=True)
 class MatchRate:
-    """What became of one pair's features.
+    """The match rates of one pair and method.
 
     Parameters
     ----------
     name, group
         The pair.
     method, refinement
-        What was matched, and what left features out ("" for nothing).
+        The method, and the refinement that leaves features out ("" for none).
     matches
-        Number of matches: features that are each other's nearest.
+        Number of matches: features that are mutual nearest neighbours.
     rates
-        Share of them within each of `LIMITS_PX`.
+        Share of the matches within each of `LIMITS_PX`.
     correct_at_20
-        How many of the 20 with the smallest ratio are within the first limit.
+        Number of the 20 matches with the smallest ratio that are within the first limit.
     seconds
         Processor time for detection, description and matching.
     """
@@ -96,7 +96,7 @@ class MatchRates:
 
 @dataclass(frozen=True)
 class ClearCase:
-    """All methods on a pair as it is."""
+    """All methods on an unchanged pair."""
 
     case: RealCase
 
@@ -131,7 +131,7 @@ class Features:
 
 @dataclass(frozen=True)
 class Matched:
-    """How far matches are off, in pixels, and their ratios, shape (n,)."""
+    """Errors of matches in pixels, and their ratios, shape (n,)."""
 
     errors_px: FloatArray
     ratio: FloatArray
@@ -150,7 +150,7 @@ def matched(there: Features, here: Features) -> Matched:
 
 @contextmanager
 def aligned(case: RealCase) -> Iterator[OffsetPair]:
-    """Open a pair on the reference's grid, the input resampled by the truth but a shift."""
+    """Open a pair on the reference's grid, the input resampled by the truth except for a shift."""
     with (
         tempfile.TemporaryDirectory() as folder,
         open_offset(Scene(case, Path(folder)).pair(Path(folder)), _OFFSET_PX) as pair,
@@ -170,7 +170,7 @@ def patches(pair: OffsetPair) -> list[Patch]:
 def rate_of(
     case: RealCase, method: str, refinement: str, parts: list[Matched], seconds: float
 ) -> MatchRate:
-    """Return the rates of all parts together; correct@20 is their mean."""
+    """Return the rates of all parts together; correct@20 is averaged over them."""
     errors = np.concatenate([part.errors_px for part in parts] or [np.zeros(0)])
     best = [part.errors_px[np.argsort(part.ratio, kind="stable")[:BEST]] for part in parts]
     right = [(each <= LIMITS_PX[0]).sum() for each in best]

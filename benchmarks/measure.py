@@ -1,7 +1,7 @@
 """Run a command and write its wall-clock time, processor time and peak memory as JSON.
 
-Run as `python measure.py RESULT.json COMMAND…`. It is a process of its own, and imports little,
-because a child's peak memory counts that of the process that started it.
+Run as `python measure.py RESULT.json COMMAND…`. It runs as a small process of its own, because a
+child's peak memory includes that of the process that started it.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Peak memory of tools on 10 000² pixels with the usual budget and with a small one."""
+"""Peak memory of tools on 10 000² pixels, with the usual memory budget and with a small one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BUDGETS_MB = (DEFAULT_MB, 300)
 _THREADS = ("--workers", "2")
 
 
-# Simulations hold their whole scenes; each of these shows another part of what they take.
+# Simulations hold their whole scenes in memory; each of these stresses another part of it.
 _SIMULATIONS = (
     ("simulate", "--size", "2000"),
     ("simulate", "--size", "3000", "--density", "urban"),
@@ -39,7 +39,7 @@ _SIMULATIONS = (
 
 @dataclass(frozen=True)
 class Run:
-    """A call of a tool with a budget: what it took of memory and of the processor."""
+    """A call of a tool with a memory budget: its peak memory and processor time."""
 
     tool: str
     budget_mb: int
@@ -69,7 +69,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def calls(pair: Pair, folder: Path) -> dict[str, list[str]]:
-    """Return the words of each tool's call."""
+    """Return the words of each tool's command line."""
     transform = folder / "transform.json"
     with open_raster(pair.input) as source:
         moved = Transform(shift_model(20.3, 30.4), source.grid.crs, source.grid)
@@ -86,7 +86,7 @@ def calls(pair: Pair, folder: Path) -> dict[str, list[str]]:
 
 
 def _simulated(simulations: Sequence[Sequence[str]]) -> Table:
-    """Return what simulations take, and what they foresee."""
+    """Return the memory that simulations take, and their own forecast of it."""
     rows = []
     for tool, *words in simulations:
         with tempfile.TemporaryDirectory() as folder:
@@ -106,7 +106,7 @@ def _simulated(simulations: Sequence[Sequence[str]]) -> Table:
 
 
 def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:
-    """Return whether the usual budget is kept."""
+    """Return the goals on the usual budget."""
     usual = [one for one in runs if one.budget_mb == DEFAULT_MB]
     largest = max(usual, key=lambda one: one.peak_bytes)
     found = f"{largest.peak_bytes / 1e6:.0f} MB ({largest.tool})"
@@ -116,7 +116,7 @@ def goals(runs: Sequence[Run], *, is_complete: bool) -> list[Goal]:
 
 
 def table(runs: Sequence[Run]) -> Table:
-    """Return what was measured."""
+    """Return the measurements."""
     head = ["tool"]
     head += [f"{what}, --memory {mb}" for mb in BUDGETS_MB for what in ("peak MB", "s")]
     rows = []

@@ -1,4 +1,4 @@
-"""Every method on the same pairs: similarities on chips, whole registrations beside peers."""
+"""All methods on the same pairs: similarities on chips, whole registrations beside peers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _GROUPS = {
     **{kind: (kind,) for kind in KINDS},
     **{f"simulated {density}": (density,) for density in _DENSITIES},
 }
-# The programs' tables, which are longer.
+# Fewer groups for the programs' tables, which are longer.
 _PROGRAM_GROUPS = {
     "SAR–optical, real": (SAR_OPTICAL,),
     "SAR–optical, simulated": _DENSITIES,
@@ -42,7 +42,7 @@ _MOST_SEEDS = 3
 _MOST_CHIPS = 100
 _QUICK_CHIPS = 16
 
-# What fused similarity is to reach on the smallest chips of real SAR pairs, without support.
+# Goal for fused similarity on the smallest chips of real SAR pairs, without support.
 _FUSED = "fused"
 _WANTED_SHARE = 0.76
 _WANTED_LEAD = -0.03
@@ -86,7 +86,7 @@ _NOTES = (
 
 
 def choose_scenes(settings: Settings) -> list[Scene]:
-    """Return the pairs: all real ones and some simulated ones, or two small ones."""
+    """Return the pairs: all real ones and some simulated ones, or just two small ones."""
     cases = read_cases(settings.data)
     if settings.quick:
         chosen = [
@@ -105,7 +105,7 @@ def choose_scenes(settings: Settings) -> list[Scene]:
 def mean_share(
     shares: Sequence[ChipShare], similarity: str, chip_px: int, kinds: Sequence[str], limit: int
 ) -> float | None:
-    """Return the mean over pairs of the share within a limit, None without chips."""
+    """Return the mean over pairs of the share within a limit; None without chips."""
     found = [
         record.shares[limit]
         for record in shares
@@ -154,7 +154,7 @@ def pair_table(shares: Sequence[ChipShare]) -> Table:
 
 
 def program_table(title: str, runs: Sequence[Registration]) -> Table:
-    """Return what each program made of a group of pairs, also those that are not installed."""
+    """Return the results of each program on a group of pairs, including those not installed."""
     rows = []
     for program in (OWN, *(program.name for program in PROGRAMS)):
         own = [run for run in runs if run.program == program]
@@ -195,7 +195,7 @@ def _error_cell(run: Registration | None) -> str:
 
 
 def goals(shares: Sequence[ChipShare]) -> tuple[Goal, ...]:
-    """Return the goals of the fused similarity, without support, and what was found."""
+    """Return the goals of the fused similarity without support, with their results."""
     chip_px, limit = CHIPS_PX[0], len(LIMITS_PX) - 1
     mean = mean_share(shares, _FUSED, chip_px, _SAR_KINDS, limit)
     leads = {}

@@ -1,4 +1,4 @@
-"""Flat, hilly and mountainous country: heights that are wrong, and terrain as the reference."""
+"""Flat, hilly and mountainous country: wrong heights, and terrain as the reference."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ERROR_M = 30.0
 
 @dataclass(frozen=True)
 class Country:
-    """A kind of terrain, and the largest mean error that is wanted there."""
+    """A kind of terrain, and the largest wanted mean error there."""
 
     relief_m: float
     slope_deg: float | None
@@ -36,16 +36,16 @@ COUNTRIES = {
     "hilly": Country(300.0, 25.0, 1.2),
     "mountains": Country(1500.0, 45.0, 1.8),
 }
-# The camera looks as far off nadir as agile satellites do: it shows a height error of 30 m by 14 m.
+# The camera looks as far off nadir as agile satellites do: 30 m of height error displace by 14 m.
 VIEWS: dict[str, tuple[tuple[str, float | str], ...]] = {
     "optical": (("input", "optical"), ("off_nadir", 25.0)),
     "SAR": (("input", "sar"), ("off_nadir", 0.0)),
 }
-# What is registered with: nothing, both terrain models, and one where the input's was right. And
-# right inputs to the terrain model itself by `register`, and to that of another scene.
+# Heights that are used: none, both terrain models, and one where the input's was right. Further
+# ways register right inputs by `register` to the terrain model, and to that of another scene.
 WITHOUT, WITH, NEEDLESS = "without heights", "with heights", "with needless heights"
 LIT, ELSEWHERE = "to the terrain", "to another terrain"
-# An input that wrong heights displace, to the right terrain model.
+# An input with wrong heights, registered to the right terrain model.
 DISPLACED = "to the terrain, without heights"
 WAYS = (WITHOUT, WITH, NEEDLESS, LIT, ELSEWHERE, DISPLACED)
 _WRONG_WAYS = (WITHOUT, WITH, DISPLACED)
@@ -54,7 +54,7 @@ _LIT_PX = 1.0
 
 @dataclass(frozen=True)
 class MountainCase:
-    """A scene of a kind of country, of which one image was made with wrong heights."""
+    """A scene of one kind of country, with one image made from wrong heights."""
 
     country: str
     view: str
@@ -63,7 +63,7 @@ class MountainCase:
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair = self._scene(self.seed)
         of = pair
         if self.way in (LIT, ELSEWHERE, DISPLACED):
@@ -85,7 +85,7 @@ class MountainCase:
 
 
 def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
-    """Return what a pair is registered with besides its images."""
+    """Return the parameters of a pair's registration besides its images."""
     dem = pair.reference.with_name(NAMES["dem"])
     if way == WITHOUT:
         return {}
@@ -95,7 +95,7 @@ def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
 
 
 def group(country: str, view: str, way: str) -> str:
-    """Return what the cases of a kind are called."""
+    """Return the name of a group of cases."""
     return f"{country}, {view} {'wrong' if way in _WRONG_WAYS else 'right'}, {way}"
 
 
@@ -120,7 +120,7 @@ def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     kinds = [(c, view, way) for c in COUNTRIES for view in VIEWS for way in WAYS]
     scenes = [(*kind, seed) for kind in kinds for seed in settings.seed_numbers()]
-    # One after the other, so that processes do not make the same pair at the same time.
+    # In sequence, so that no two processes make the same pair at the same time.
     for scene in scenes:
         mountain(*scene).pair(settings.cache)
     outcomes = run_cases([MountainCase(*scene, settings.cache) for scene in scenes], settings.jobs)
@@ -135,7 +135,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(country: str, view: str, way: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals for one kind of scenes and what was found."""
+    """Return the goals for one kind of scene, with their results."""
     title = group(country, view, way)
     errors = [outcome.error_px for outcome in accepted(outcomes)]
     mean = float(np.mean(errors)) if errors else float("nan")
@@ -156,7 +156,7 @@ def goals(country: str, view: str, way: str, outcomes: Sequence[Outcome]) -> tup
 
 
 def models_table(groups: dict[str, list[Outcome]]) -> Table:
-    """Return a table of which models were taken, one row for each kind of scenes."""
+    """Return a table of the models that were chosen, one row for each kind of scene."""
     names = sorted({o.model for outcomes in groups.values() for o in accepted(outcomes)})
     rows = [
         [name, *(str(sum(o.model == model for o in accepted(found))) for model in names)]

@@ -1,4 +1,4 @@
-"""Pairs on one grid, the input resampled by the truth but for a known offset."""
+"""Pairs on one grid, with the input resampled by the truth except for a known offset."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .attempt import Pair
 from .cases import RealCase, write_case, write_image
 from .simulations import Simulation
 
-# Fewer check points that both images show are no truth; the lattice is taken then.
+# With fewer check points in both images, the truth is taken from the lattice.
 _LEAST_CHECK_POINTS = 4
 
 
@@ -41,20 +41,20 @@ class Scene:
         return self.source.density if simulated else self.source.kind
 
     def pair(self, folder: Path) -> Pair:
-        """Return the pair's files, written into a folder if they are not kept."""
+        """Return the pair's files, written into a folder unless they are kept."""
         if isinstance(self.source, Simulation):
             return self.source.pair(self.cache)
         return write_case(self.source, (0.0, 0.0), folder)
 
     def offset_px(self, limits: tuple[float, float]) -> FloatArray:
-        """Return a drawn offset (col, row), the size of each component between the limits."""
+        """Return a drawn offset (col, row) whose components lie between the limits in size."""
         generator = np.random.default_rng((zlib.crc32(self.name.encode()), int(limits[1])))
         return generator.uniform(*limits, 2) * generator.choice([-1.0, 1.0], 2)
 
 
 @dataclass(frozen=True)
 class OffsetPair:
-    """A pair on the reference's grid, the input resampled by the truth but for an offset.
+    """A pair on the reference's grid, with the input resampled by the truth except for an offset.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class OffsetPair:
     matrix
         Affine truth, input (col, row) = matrix · reference (col, row, 1).
     offset_px
-        Where the resampled input shows what the reference shows at 0, (col, row).
+        Position (col, row) in the resampled input that shows the reference's pixel 0.
     """
 
     images: ImagePair
@@ -72,14 +72,14 @@ class OffsetPair:
 
     @property
     def to_input_px(self) -> PointFunction:
-        """From map positions to input pixels."""
+        """The function from map positions to input pixels."""
         grid = self.images.grid
         return lambda xy: apply_matrix(self.matrix, grid.map_to_pixel(xy) - self.offset_px)
 
     def nominal(self, to_px: PointFunction | None = None) -> PointFunction:
-        """Return what matchers take for a model: the nominal places of what lies at `to_px`.
+        """Return the model for matchers: the nominal positions of the content at `to_px`.
 
-        By default, as `to_input_px` has it.
+        By default, that is `to_input_px`.
         """
         to_input_px = self.to_input_px if to_px is None else to_px
         reference, input = self.images.grid, self.images.input.source.grid
@@ -90,14 +90,14 @@ class OffsetPair:
         return nominal_xy
 
     def offset_of(self, input_px: FloatArray) -> FloatArray:
-        """Return where input pixels lie in the resampled input."""
+        """Return the positions of input pixels in the resampled input."""
         linear, shift = self.matrix[:, :2], self.matrix[:, 2]
         return np.asarray((input_px - shift) @ np.linalg.inv(linear).T + self.offset_px)
 
 
 @contextmanager
 def open_offset(pair: Pair, offset_px: FloatArray) -> Iterator[OffsetPair]:
-    """Open a pair with its input off by a known offset."""
+    """Open a pair with its input displaced by a known offset."""
     assert pair.lattice is not None
     with open_raster(pair.reference) as reference, open_raster(pair.input) as image:
         grid = reference.grid
@@ -107,7 +107,7 @@ def open_offset(pair: Pair, offset_px: FloatArray) -> Iterator[OffsetPair]:
 
 
 def affine_of(truth: Truth) -> FloatArray:
-    """Return the affine matrix, shape (2, 3), nearest to a truth."""
+    """Return the affine matrix, shape (2, 3), that is nearest to a truth."""
     design = np.column_stack([truth.reference_px, np.ones(len(truth.reference_px))])
     return np.linalg.lstsq(design, truth.input_px, rcond=None)[0].T
 
@@ -117,9 +117,9 @@ def apply_matrix(matrix: FloatArray, px: FloatArray) -> FloatArray:
 
 
 def write_offset(pair: Pair, offset_px: FloatArray, folder: Path) -> Pair:
-    """Write both images on one grid, the input off by a known shift, cut to where both are valid.
+    """Write both images on one grid, the input displaced by a known shift, cropped to common data.
 
-    Every program gets the same files, also those that know no georeferencing and no masks.
+    Every program gets the same files, including those without georeferencing or masks.
     """
     assert pair.truth is not None
     with open_offset(pair, offset_px) as off:
@@ -153,9 +153,9 @@ def write_offset(pair: Pair, offset_px: FloatArray, folder: Path) -> Pair:
 
 
 def valid_box(valid: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """Return column, row, width and height of a box without invalid pixels along its border.
+    """Return column, row, width and height of a box whose border has no invalid pixels.
 
-    The side with most invalid pixels is moved inwards until there are none.
+    The side with most invalid pixels moves inwards until none are left.
     """
     top, left, (bottom, right) = 0, 0, valid.shape
     while top < bottom and left < right:

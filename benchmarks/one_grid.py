@@ -1,4 +1,4 @@
-"""Real pairs on one grid, as most products are: where they belong, and off by known shifts."""
+"""Real pairs on one grid, as most products have: aligned, and displaced by known shifts."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .tables import accuracy_table
 
 _LARGEST_PX = 20.0
 
-# Both images show 141 rows of it at once, of which 144 are needed.
+# The images have 141 rows in common; 144 are needed.
 _TOO_SMALL = "oo-lake-bands"
 
-# What is made of a drawn shift, (col, row).
+# Displacements (col, row) derived from a drawn shift.
 PLACES: dict[str, Callable[[FloatArray], FloatArray]] = {
     "where they belong": np.zeros_like,
     "off by whole pixels": np.rint,
@@ -32,14 +32,14 @@ PLACES: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 @dataclass(frozen=True)
 class OneGridCase:
-    """A real pair whose input is resampled onto the grid of the reference, off by a shift."""
+    """A real pair with the input resampled onto the reference's grid, displaced by a shift."""
 
     scene: Scene
     place: str
 
     @property
     def shift_px(self) -> FloatArray:
-        """How far off the input is, (col, row)."""
+        """Displacement of the input, (col, row)."""
         return PLACES[self.place](self.scene.offset_px((_LARGEST_PX / 2, _LARGEST_PX)))
 
     def run(self, workers: int | None) -> Outcome:

@@ -37,7 +37,7 @@ _ROTATED = ("optical-optical-rotated", "optical-infrared-rotated")
 
 CLOUDED = "Registrations under clouds over half of the input"
 
-# Of the registrations so many must be correct.
+# Wanted share of correct registrations.
 _WANTED_SHARE = 0.9
 
 
@@ -64,7 +64,7 @@ def run(settings: Settings) -> SuiteResult:
     clouded_outcomes = run_cases(clouded, settings.jobs)
     different = [*crossings(cases), *map(FreeCrossing, crossed(turned))]
     crossed_outcomes = run_cases(different[:2] if settings.quick else different, settings.jobs)
-    # Not quickly, and by itself: it is timed.
+    # Run alone, as it is timed; not in quick runs.
     timed = [] if settings.quick else [case for case in cases if case.name == SOURCE]
     timings = [timing for case in timed for timing in time_features(case)]
     return SuiteResult(
@@ -111,7 +111,7 @@ def goals(
     outcomes: Sequence[Outcome],
     crossed_outcomes: Sequence[Outcome],
 ) -> tuple[Goal, ...]:
-    """Return the goals and what was found."""
+    """Return the goals, with their results."""
     gain = 100 * (
         _mean((r for r in clear if r.method == "HOG-81"), lambda r: r.rates[0])
         - _mean((r for r in clear if r.method == "SURF-64"), lambda r: r.rates[0])
@@ -152,7 +152,7 @@ def _refinement_goal(cloudy: Sequence[MatchRate], name: str, wanted: str | None)
 
 
 def _gains(cloudy: Sequence[MatchRate], kernel: str) -> list[float]:
-    """Return by how many points a kernel raises the rate of each cloudy pair."""
+    """Return the gain of each cloudy pair's rate by a kernel, in percentage points."""
     before = {rate.name: rate.rates[0] for rate in cloudy if not rate.refinement}
     return [100 * (r.rates[0] - before[r.name]) for r in cloudy if r.refinement == kernel]
 

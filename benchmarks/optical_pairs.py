@@ -1,4 +1,4 @@
-"""Simulated pairs of optical images: one place seen twice, in another light, from elsewhere."""
+"""Simulated pairs of optical images: one place in two illuminations and from two directions."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from .simulations import fingerprint, kept, read_exact, simulator_version
 _EARLIER = OpticalOptions(sun_azimuth_deg=140.0, bands=("green",))
 _LATER = OpticalOptions(210.0, 35.0, view_azimuth_deg=100.0, off_nadir_deg=8.0, bands=("red",))
 
-# The second image's textures and noise are others.
+# Seed offset of the second image's textures and noise.
 _OTHER_DATE = 100_000
 
 
 @dataclass(frozen=True)
 class OpticalPair:
-    """What a simulated pair of optical images is made from.
+    """The parameters of a simulated pair of optical images.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ class OpticalPair:
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name for display."""
         return f"optical {self.density} {self.size}², seed {self.seed}"
 
     def pair(self, cache: Path) -> Pair:
-        """Return the pair, which is made unless the folder `cache` has it."""
+        """Return the pair; it is made unless the folder `cache` has it."""
         words = f"{self.size}-{self.density}-{self.seed}"
         folder = cache / f"optical-{words}-{simulator_version()}-{fingerprint([Path(__file__)])}"
         return read_exact(kept(folder, self._write))

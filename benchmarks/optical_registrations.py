@@ -1,4 +1,4 @@
-"""Whole registrations by match_optical: pairs that belong together, and pairs that do not."""
+"""Whole registrations by match_optical: matching pairs, and pairs of different places."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FreeCrossing:
     crossed: RotatedCase
 
     def run(self, workers: int | None) -> Outcome:
-        """Register what cannot be registered."""
+        """Register the pair, which must be refused."""
         assert self.crossed.input is not None
         reference, other = self.crossed.case, self.crossed.input
         name = f"{reference.name} × {other.stem}"
@@ -52,7 +52,7 @@ class FreeCrossing:
 
 
 def crossings(cases: Sequence[RealCase]) -> list[Crossing]:
-    """Return references with the inputs of some other places, at the same claimed place."""
+    """Return references with the inputs of some other places, georeferenced to the same place."""
     pairs = [
         (case, cases[(index + stride) % len(cases)])
         for index, case in enumerate(cases)

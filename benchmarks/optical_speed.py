@@ -1,4 +1,4 @@
-"""How long features of large optical images take."""
+"""Processing time for the features of large optical images."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ THREADS = 2
 SURF, REGISTRATION = "SURF-64, one image", "match_optical, two images"
 LONGEST_S = {SURF: 2.0, REGISTRATION: 15.0}
 
-# A pair without rotation, whose images are mirrored at their borders until they are large enough.
+# An unrotated pair, whose images are mirrored at their borders until they are large enough.
 SOURCE = "oo-nanjing"
 _SHIFT_PX = (7.3, -4.6)
 _TIMES = 3
@@ -38,7 +38,7 @@ _TIMES = 3
 
 @dataclass(frozen=True)
 class Timing:
-    """What took how long: by the clock, and of all processors together."""
+    """One measurement: wall-clock time, and the time of all processors together."""
 
     what: str
     seconds: float
@@ -46,7 +46,7 @@ class Timing:
 
     @property
     def least_seconds(self) -> float:
-        """What two processors need that do nothing else, if the work is shared well."""
+        """The time on two idle processors that share the work well."""
         return self.processor_seconds / THREADS
 
 
@@ -76,7 +76,7 @@ def time_features(case: RealCase) -> list[Timing]:
 
 
 def timing_goals(timings: Sequence[Timing]) -> list[Goal]:
-    """Return the goals on time, which other work on the machine must not decide, and findings."""
+    """Return the timing goals, which other work on the machine must not decide, and findings."""
     return [
         Goal(
             f"{one.what} of {SIDE_PX}×{SIDE_PX} px",

@@ -77,7 +77,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(found: Mapping[str, Measured]) -> list[Goal]:
-    """Return the goal and what was found; it counts processor time beside other work, too."""
+    """Return the goal, with its result, in processor time: it counts beside other work, too."""
     if SAME_FILE not in found:
         return []
     own, rival = found[OWN], found[SAME_FILE]
@@ -90,7 +90,7 @@ def goals(found: Mapping[str, Measured]) -> list[Goal]:
 
 
 def commands(image: Path, dem: Path, like: Path) -> dict[str, list[str]]:
-    """Return the calls of all programs that make the orthoimage."""
+    """Return the commands by which each program makes the orthoimage."""
     found = {
         OWN: [
             *(sys.executable, "-m", "groundtie", "orthorectify", str(image), OUTPUT, "--quiet"),
@@ -115,14 +115,14 @@ def commands(image: Path, dem: Path, like: Path) -> dict[str, list[str]]:
 
 
 def with_overviews(command: list[str]) -> list[str]:
-    """Return a call that adds overviews to what another one writes."""
+    """Return a command that adds overviews to another command's output."""
     options = f"--config COMPRESS_OVERVIEW DEFLATE --config GDAL_NUM_THREADS {THREADS}"
     script = f'file=$1; shift; "$@" "$file" && gdaladdo -q -r average {options} "$file" 2 4 8 16'
     return ["sh", "-c", script, "sh", OUTPUT, *command[:-1]]
 
 
 def gdalwarp(image: Path, dem: Path, like: Path, tolerance_px: str) -> list[str]:
-    """Return the call of gdalwarp that makes the same orthoimage."""
+    """Return the gdalwarp command that makes the same orthoimage."""
     with rasterio.open(like) as grid:
         bounds = [f"{value:.17g}" for value in grid.bounds]
         size, crs = [str(grid.width), str(grid.height)], grid.crs.to_string()
@@ -136,7 +136,7 @@ def gdalwarp(image: Path, dem: Path, like: Path, tolerance_px: str) -> list[str]
 
 
 def write_large(folder: Path, sensor: RPC) -> tuple[Path, Path]:
-    """Write an image of 44 Mpx with real RPCs, and a terrain of 30 m pixels under it."""
+    """Write an image of 44 Mpx with real RPCs, and a terrain model of 30 m pixels for it."""
     random = np.random.default_rng(0)
     texture = cv2.GaussianBlur(random.normal(size=(_SIDE_PX,) * 2).astype(np.float32), (0, 0), 2)
     values = np.clip(2000 + 400 * texture / texture.std(), 1, 65_535).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""Peaks of mutual information on real SAR–optical pairs: bins, masks, and ways to climb to them.
+"""Peaks of mutual information on real SAR–optical pairs: bins, masks, and peak searches.
 
 Inputs are warped by the truth, so that only a shift is unknown.
 """
@@ -41,7 +41,7 @@ Peak = tuple[int, int]
 
 RADIUS_PX = 20
 
-# [Suri2010] table 3.2, without its 256th bin: bins are bytes, and one value stands for "masked".
+# [Suri2010] table 3.2, without its 256th bin: bins are bytes, and one value marks masked pixels.
 BINS_RADIUS_PX = 10
 BIN_COUNTS = (8, 16, 32, 64, 128, 255)
 WANTED_BINS = 32
@@ -55,7 +55,7 @@ WANTED_SHARE = 0.7
 _MASK_BINS = 32
 _BLOCK_PX = 4
 
-# [Suri2010] table 4.3, from many seeds instead of four.
+# [Suri2010] table 4.3, with many seeds instead of four.
 RUNS = 100
 CONTINUOUS_RUNS = 3
 WANTED_REACHED = 0.9
@@ -87,7 +87,7 @@ class Aligned:
     input: Patch
 
     def windows(self, centre: Peak, radius_px: int) -> tuple[Patch, Patch]:
-        """Return the same template for every centre, and the input around it, displaced.
+        """Return the same template for every centre, and the displaced input around it.
 
         The input's content lies -centre (right, down) from where the template expects it.
         """
@@ -124,9 +124,9 @@ def align(case: RealCase) -> Aligned:
 def nmi_surfaces(
     template: NDArray[np.uint8], search: NDArray[np.uint8], bins: int, orders: Sequence[int]
 ) -> list[Surface]:
-    """Return NMI over shifts for several kernels; 1 is nearest neighbour.
+    """Return the NMI over shifts for several kernel orders; 1 is nearest neighbour.
 
-    `search` is larger than `template` by the radius and the widest kernel's reach on each side.
+    `search` exceeds `template` by the radius and the widest kernel's reach on each side.
     """
     counts = count_joint_histograms(template, search, (bins, bins))
     surfaces = []
@@ -135,7 +135,7 @@ def nmi_surfaces(
         inner = slice(further, -further or None)
         near = counts[inner, inner]
         histograms = near if order == NEAREST else gpve_histograms(near, order)
-        # Row by row: the logarithms of all histograms at once would need much memory.
+        # Row by row, because the logarithms of all histograms at once would need much memory.
         rows = [normalized_mutual_information(row) for row in histograms]
         surfaces.append(np.stack(rows).astype(np.float32))
     return surfaces
@@ -213,12 +213,12 @@ def measure_bins(pair: Aligned) -> list[dict[str, Any]]:
 
 
 def is_true(peak: Peak, sigma_px: float) -> bool:
-    """Tell whether a peak is the truth, as far as that can be believed."""
+    """Return whether a peak lies within `CORRECT_PX` plus the truth's uncertainty of the truth."""
     return float(np.hypot(*peak)) <= sigma_px + CORRECT_PX
 
 
 def bins_goal(records: Sequence[dict[str, Any]]) -> Goal:
-    """Return the goal for numbers of bins, and what was found."""
+    """Return the goal for numbers of bins, with its result."""
     wanted = [record for record in records if record["bins"] >= WANTED_BINS]
     found = sum(record["is_true"] for record in wanted)
     return Goal(
@@ -230,7 +230,7 @@ def bins_goal(records: Sequence[dict[str, Any]]) -> Goal:
 
 
 def bins_table(records: Sequence[dict[str, Any]]) -> Table:
-    """Return how many pairs have their peak where the truth is."""
+    """Return the number of pairs whose peak lies at the truth."""
     rows = []
     for binning in BINNINGS:
         for count in BIN_COUNTS:
@@ -264,7 +264,7 @@ def block_mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def measure_masks(pair: Aligned) -> list[dict[str, Any]]:
-    """Return the peaks of one pair with the brightest pixels, or blocks, of the SAR masked."""
+    """Return the peaks of one pair with the SAR image's brightest pixels or blocks masked."""
     values = pair.reference.values
     margin = RADIUS_PX + max(reach(order) for order in ORDERS)
     own, other = (
@@ -298,7 +298,7 @@ def measure_masks(pair: Aligned) -> list[dict[str, Any]]:
 
 
 def masks_goals(records: Sequence[dict[str, Any]]) -> list[Goal]:
-    """Return the goals for masks, by what is masked and on which surface."""
+    """Return the goals for masks, by masked unit and surface."""
     goals = []
     for by in ("pixels", "blocks"):
         for surface in ("cubic", "without trend"):
@@ -317,7 +317,7 @@ def masks_goals(records: Sequence[dict[str, Any]]) -> list[Goal]:
 def _steady(
     records: Sequence[dict[str, Any]], by: str, surface: str
 ) -> tuple[str, list[str], list[str]]:
-    """Return how many masks keep the peak, which pairs all of them do, and all pairs."""
+    """Return how many masks keep the peak, the pairs where all of them do, and all pairs."""
     group = [
         r
         for r in records
@@ -349,7 +349,7 @@ def masks_table(records: Sequence[dict[str, Any]]) -> Table:
 
 
 def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
-    """Return how often every search reaches the peak of one pair, and what it takes."""
+    """Return how often every search reaches the peak of one pair, and its cost."""
     rng = np.random.default_rng(zlib.crc32(pair.name.encode()))
     right, down = map(int, rng.integers(-_OFF_CENTRE_PX, _OFF_CENTRE_PX + 1, 2))
     windows = pair.windows((right, down), RADIUS_PX)
@@ -385,7 +385,7 @@ def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
 
 
 def exhaustive_peak(template: Patch, input: Patch) -> Peak:
-    """Return the shift of the highest NMI at aligned grids."""
+    """Return the shift with the highest NMI at aligned grids."""
     bins = CLIMBED.bins_for(template.values.size)
     own, other = (to_bins(patch.values, patch.valid, bins) for patch in (template, input))
     counts = count_joint_histograms(own, other, (bins, bins))
@@ -393,7 +393,7 @@ def exhaustive_peak(template: Patch, input: Patch) -> Peak:
 
 
 def climbs_goals(records: Sequence[dict[str, Any]]) -> list[Goal]:
-    """Return the goals for all searches; only the discrete SPSA has one to reach."""
+    """Return the goals for all searches; only the discrete SPSA has a wanted value."""
     goals = []
     for name in SEARCHES:
         group = [record for record in records if record["search"] == name]
@@ -427,7 +427,7 @@ def climbs_table(records: Sequence[dict[str, Any]]) -> Table:
 
 
 def time_counting(size: int) -> dict[str, Any]:
-    """Time the volume of a large window, and the same counted shift by shift, on one thread."""
+    """Time the counting of a large window's shifts, by FFT and one by one, on one thread."""
     rng = np.random.default_rng(0)
     span = 2 * WINDOW_RADIUS_PX + 1
     template, search = (
@@ -454,7 +454,7 @@ def time_counting(size: int) -> dict[str, Any]:
 
 
 def counting_goal(record: dict[str, Any]) -> Goal:
-    """Return the goal for counting by FFT, and what was found."""
+    """Return the goal for counting by FFT, with its result."""
     ratio = record["direct_seconds"] / record["seconds"]
     size = record["size_px"]
     equal = "same counts" if record["same"] else "other counts"

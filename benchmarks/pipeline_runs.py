@@ -1,4 +1,4 @@
-"""Registrations by a specification: what is compared here and is no option of a tool."""
+"""Registrations by a specification, for comparisons that no tool offers as an option."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ def found_by(
     search_radius: float | None = None,
     workers: int | None = None,
 ) -> Registration:
-    """Return what is found, whatever the verdict on it is; its rasters are closed.
+    """Return the result, whatever the verdict on it; its rasters are closed.
 
     Parameters
     ----------
     spec
-        How it is registered.
+        Specification of the registration.
     reference, input
-        What `open_raster` takes.
+        Anything that `open_raster` takes.
     search_radius
-        On the map.
+        In map units.
     workers
         Number of threads.
     """

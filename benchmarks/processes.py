@@ -1,4 +1,4 @@
-"""Whole processes, timed: what a user waits for, imports and written output included."""
+"""Whole processes, timed as users experience them, including imports and written output."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 
 import groundtie
 
-# Stands in a command for a file that is written and thrown away.
+# Placeholder in a command for a file that is written and discarded.
 OUTPUT = "{output}"
 
 _MEASURE = Path(__file__).with_name("measure.py")
@@ -24,7 +24,7 @@ _PACKAGE = Path(groundtie.__file__).parents[1]
 
 @dataclass(frozen=True)
 class Measured:
-    """Time and memory of a process, and what it printed."""
+    """Time, memory and output of a process."""
 
     seconds: float
     processor_seconds: float
@@ -39,7 +39,7 @@ def measure(command: Sequence[str]) -> Measured:
     Raises
     ------
     RuntimeError
-        The command failed; a registration that was refused (exit code 3) did not.
+        The command failed; a refused registration (exit code 3) is no failure.
     """
     paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
     with tempfile.TemporaryDirectory() as folder:
@@ -59,6 +59,6 @@ def measure(command: Sequence[str]) -> Measured:
 
 
 def measure_often(command: Sequence[str], times: int) -> Measured:
-    """Run a command several times and return the run of the median time."""
+    """Run a command several times and return the run with the median time."""
     runs = sorted((measure(command) for _ in range(times)), key=lambda run: run.seconds)
     return runs[int(np.floor((len(runs) - 1) / 2))]

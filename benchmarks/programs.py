@@ -20,7 +20,7 @@ from .offsets import Scene, apply_matrix, write_offset
 from .processes import measure
 from .speed import OWN, PEERS, own_command, peer_python
 
-# Every start is wrong by so much in columns and in rows; no program may need longer than the limit.
+# Initial error in columns and in rows; time limit of a program.
 SHIFTS_PX = (10.0, 20.0)
 TIME_LIMIT_S = 180.0
 _MAX_SHIFT = "21"
@@ -28,7 +28,7 @@ _MAX_SHIFT = "21"
 
 @dataclass(frozen=True)
 class Program:
-    """A peer: its name, environment, script and what the script is told besides the files."""
+    """A peer: its name, environment, script, and the script's arguments besides the files."""
 
     name: str
     environment: str
@@ -52,7 +52,7 @@ PROGRAMS = (
 
 @dataclass(frozen=True)
 class Registration:
-    """What one program made of one pair."""
+    """The result of one program on one pair."""
 
     name: str
     group: str
@@ -67,7 +67,7 @@ class Registration:
 
 @dataclass(frozen=True)
 class Registrations:
-    """What all programs made of one pair."""
+    """The results of all programs on one pair."""
 
     records: tuple[Registration, ...]
 
@@ -79,7 +79,7 @@ class Registrations:
 
 @dataclass(frozen=True)
 class WholeCase:
-    """All programs that are installed on one pair."""
+    """All installed programs on one pair."""
 
     scene: Scene
 
@@ -94,7 +94,7 @@ class WholeCase:
         return Registrations(tuple(r for r in records if r is not None))
 
     def register(self, program: Program | None, pair: Pair, threads: int) -> Registration | None:
-        """Return what a program (None: GroundTie) makes of a pair; None if it is not installed."""
+        """Return a program's (None: GroundTie's) result on a pair; None if it is not installed."""
         words = command(program, pair, threads)
         if words is None:
             return None
@@ -104,7 +104,7 @@ class WholeCase:
             run = measure(words)
         except RuntimeError as failure:
             seconds = time.perf_counter() - started
-            # A peer that fails has at least not claimed anything.
+            # A failing peer claims nothing, so it counts as refused.
             verdict = CRASHED if program is None else REFUSED
             reason = "time limit" if seconds >= TIME_LIMIT_S else f"failed: {str(failure)[-300:]}"
             return Registration(
@@ -140,7 +140,7 @@ def command(program: Program | None, pair: Pair, threads: int) -> list[str] | No
 
 
 def own_error_px(output: str, pair: Pair) -> float | None:
-    """Return the error of what `groundtie coregister --json` printed, None if it refused."""
+    """Return the error of the output of `groundtie coregister --json`; None if refused."""
     values = json.loads(output)
     if not values["verdict"]["accepted"]:
         return None
@@ -149,7 +149,7 @@ def own_error_px(output: str, pair: Pair) -> float | None:
 
 
 def error_px(output: str, pair: Pair) -> float | None:
-    """Return the error of the matrix in a peer's last line of output, None if there is none."""
+    """Return the error of the matrix in the last line of a peer's output; None if there is none."""
     found = json.loads(output.strip().splitlines()[-1])
     if found is None or not np.isfinite(found).all():
         return None

@@ -1,4 +1,4 @@
-"""How far simulated radar images are like real ones, by statistics that matching depends on."""
+"""Similarity of simulated and real radar images in the statistics that matching depends on."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from .suites import Settings, SuiteResult, Table, by_group
 SIZE_PX = 600
 _MARGIN_PX = 192
 
-# Window of the texture, lags of the autocorrelation, and the step that is an edge between the means
-# of blocks, where the speckle of one look has 1.4 dB.
+# Texture window, largest lag of the autocorrelation, block side, and the step between block means
+# that counts as an edge; single-look speckle has 1.4 dB there.
 _WINDOW_PX, _LAGS_PX, _BLOCK_PX, _EDGE_DB = 9, 64, 4, 5.0
 
 _Image = NDArray[np.float32]
 
-# Radar images of SAR–optical pairs, by group; not those in decibels or rescaled. Both images of the
-# SAR–SAR pairs are country.
+# Radar images of SAR–optical pairs by group, except those in decibels or rescaled. The SAR–SAR
+# pairs show open country.
 _TOWNS = {
     "so-rosenheim": "SAR2_sen.tif",
     "so-dense-urban": "SAR_sen.png",
@@ -41,11 +41,11 @@ _TOWNS = {
 }
 _COUNTRY = {"so-fields": "SAR1_sen.tif", "so-delta": "SO1a.png", "so-forest-river": "SO3a.png"}
 
-# Share of the sides of a real image that is looked at, in its middle: some have empty corners.
+# Central share of each side of a real image that is used: some have empty corners.
 _MIDDLE = 0.7
 
 SIMULATED: Mapping[str, tuple[float, float]] = {
-    # Pixel size and looks, about as the real images have them.
+    # Pixel size and looks, roughly those of the real images.
     "rural": (3.0, 2.0),
     "suburban": (3.0, 2.0),
     "urban": (3.0, 2.0),
@@ -61,20 +61,20 @@ class Likeness:
     Parameters
     ----------
     name, group
-        Which image, and with which others it is counted.
+        The image, and the group it is counted in.
     looks
         Equivalent number of looks in homogeneous areas.
     span_db, tail_db
-        From the 10 % to the 90 % quantile of the power, and from the median to the 99 % one.
+        Range of the power from the 10 % to the 90 % quantile, and from the median to the 99 % one.
     strong
         Share of strong scatterers, 0 to 1: blocks 6 dB above the median.
     texture
-        Median coefficient of variation in windows, over that of the speckle.
+        Median coefficient of variation in windows, relative to that of speckle.
     near, far
-        Autocorrelation of the logarithm at 1 px, and the lag at which it falls below a tenth; at
+        Autocorrelation of the logarithm at 1 px, and the lag at which it falls below a tenth, at
         most `_LAGS_PX`.
     edges
-        Share of borders between blocks, 0 to 1, with a step of `_EDGE_DB` or more.
+        Share of block borders, 0 to 1, with a step of `_EDGE_DB` or more.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Likeness:
 
 
 def likeness(name: str, group: str, amplitude: _Image) -> Likeness:
-    """Return the statistics of a radar image, amplitudes of shape (h, w), all of them valid."""
+    """Return the statistics of a radar image: valid amplitudes of shape (h, w)."""
     power = np.maximum(amplitude, np.float32(0.5)) ** 2
     valid = np.ones(power.shape, bool)
     looks = estimate_looks(power, valid)
@@ -113,16 +113,16 @@ def likeness(name: str, group: str, amplitude: _Image) -> Likeness:
 
 
 def autocorrelation(values: _Image) -> tuple[float, float]:
-    """Return the autocorrelation at 1 px, and from which lag it is below 0.1: means of both axes.
+    """Return the autocorrelation at 1 px, and the lag where it falls below 0.1, means of both axes.
 
-    The mean around each pixel stays in: large structure is part of what is measured.
+    The local mean is not removed: large structure is part of the measurement.
     """
     centred = values - values.mean()
     size = [scipy.fft.next_fast_len(n + _LAGS_PX, real=True) for n in centred.shape]
     found = scipy.fft.irfft2(np.abs(scipy.fft.rfft2(centred, size)) ** 2, size)
     lags = np.arange(_LAGS_PX + 1)
     height, width = centred.shape
-    # As many products as there are pixels that far apart.
+    # Normalised by the number of pixel pairs at each lag.
     along = found[0, : _LAGS_PX + 1] / (width - lags) * width
     down = found[: _LAGS_PX + 1, 0] / (height - lags) * height
     curve = (along + down) / 2 / found[0, 0]
@@ -131,7 +131,7 @@ def autocorrelation(values: _Image) -> tuple[float, float]:
 
 
 def strong_share(amplitude: _Image) -> float:
-    """Return the share of strong scatterers, as it is counted for every pair."""
+    """Return the share of strong scatterers, counted as for every pair."""
     with open_raster(Raster(amplitude)) as made:
         return share_of_strong_scatterers(Scene.of(made))
 

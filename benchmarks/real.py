@@ -24,7 +24,7 @@ from .tables import accuracy_table
 LARGEST_SHIFT_PX = 20.0
 SHIFTS = 5
 
-# Of the registrations of SAR–optical pairs, so many must be correct.
+# Wanted number of correct registrations of SAR–optical pairs.
 _WANTED = 40
 _WANTED_OF = 45
 
@@ -36,13 +36,13 @@ class ShiftedCase:
     Parameters
     ----------
     case, number
-        Which.
+        The case, and the number of the shift.
     largest_px
-        The shift at most.
+        Largest shift.
     tool
-        What registers it.
+        Tool that registers it.
     pixel_m
-        Pixel size at which the images are compared, of references of 1 m; None: as by default.
+        Pixel size of the comparison, for references of 1 m; None: the default.
     """
 
     case: RealCase
@@ -69,7 +69,7 @@ class ShiftedCase:
 
 @dataclass(frozen=True)
 class FreeCase:
-    """A real pair as it is, without georeferencing."""
+    """A real pair without georeferencing."""
 
     case: RealCase
     tool: str
@@ -113,7 +113,7 @@ def by_kind(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
 
 
 def goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the suite's goals, which are on SAR–optical pairs, and what was found."""
+    """Return the suite's goals, on SAR–optical pairs, with their results."""
     sar_optical = [outcome for outcome in outcomes if outcome.group == SAR_OPTICAL]
     correct = count(sar_optical, CORRECT)
     all_wrong = count(outcomes, SILENTLY_WRONG)

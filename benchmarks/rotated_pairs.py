@@ -26,16 +26,16 @@ LONGEST_S = 3.0
 _SIDE_PX = 256
 _CROSSED = "crossed"
 
-# The other cases that each reference is crossed with: so many places further in the list.
+# The inputs that each reference is crossed with: this many places further in the list.
 STRIDES = (1, 4, 11, 17)
 
-# Two cases that show the same place, which no file name tells: seen by eye.
+# Two cases of one place, found by visual inspection: their file names differ.
 _SAME_PLACE = {"oi-rotated/80", "oi-rotated/100"}
 
 
 @dataclass(frozen=True)
 class RotatedCase:
-    """A reference and an input, with their truth; one of another place has none."""
+    """A reference and an input, with their truth; None if they show different places."""
 
     case: RealCase
     input: Path | None = None
@@ -82,7 +82,7 @@ def rotated_cases(folder: Path) -> list[RealCase]:
 
 
 def crossed(cases: Sequence[RealCase]) -> list[RotatedCase]:
-    """Return references with the inputs of other places."""
+    """Return references paired with the inputs of other places."""
     pairs = [
         (case, cases[(index + stride) % len(cases)])
         for index, case in enumerate(cases)
@@ -119,7 +119,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(group: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals for one group and what was found."""
+    """Return the goals for one group, with their results."""
     total = len(outcomes)
     refused, wrong = count(outcomes, REFUSED), count(outcomes, SILENTLY_WRONG)
     if group == _CROSSED:

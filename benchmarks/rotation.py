@@ -42,7 +42,7 @@ REAL = (
 SIMULATED = tuple(Simulation(1000, density, s) for density in ("rural", "suburban") for s in (1, 2))
 _QUICK_IMAGES = 3
 
-# P's images are not to be had: these are cut to their sizes, the third to its shape only.
+# P's images are not available: these are cropped to their sizes, the third only to its shape.
 STAND_INS = {
     "image-1": ("oo-lakes/e1.jpg", (489, 300)),
     "image-2": ("oo-nanjing/nanjing1.jpg", (579, 481)),
@@ -59,14 +59,14 @@ LONGEST_SIDE_PX = 512
 LARGEST_SHIFT_PX = 20.0
 _RADIUS_PX = 40.0
 
-# Largest median errors.
+# Largest wanted median errors.
 _ROTATION_DEG = {PHASE: 0.1, MELLIN: 0.1, RADON: 0.25}
 _ERROR_PX = 0.5
 
 
 @dataclass(frozen=True)
 class Range:
-    """From which range rotation and scale are drawn, and for which methods."""
+    """Ranges from which rotation and scale are drawn, and the methods that are tested."""
 
     name: str
     rotation_deg: float
@@ -74,7 +74,7 @@ class Range:
     methods: tuple[str, ...]
 
     def draw(self, seed: int) -> Pose:
-        """Return a pose; its shift is within ± `LARGEST_SHIFT_PX`."""
+        """Return a pose with a shift within ± `LARGEST_SHIFT_PX`."""
         random = np.random.default_rng(seed)
         turned = random.uniform(-self.rotation_deg, self.rotation_deg)
         scale = float(np.exp(random.uniform(*np.log(self.scale))))
@@ -95,20 +95,20 @@ RANGES = (SHIFTS, SMALL, LARGE)
 
 @dataclass(frozen=True)
 class Found:
-    """What became of one search.
+    """The outcome of one search.
 
     Parameters
     ----------
     image, range, method, similarity, corners, noise_variance
-        What was searched, and how.
+        Image, range, method and further parameters of the search.
     rotation_deg, scale
         The truth.
     rotation_error_deg, error_px
-        Errors of the best candidate; the latter is the root mean square one over the reference.
+        Errors of the best candidate; `error_px` is the root mean square over the reference.
     shift_errors_px
         Errors of the shift (x, y) of the input's centre.
     height
-        The best candidate's.
+        Height of the best candidate.
     seconds
         Wall-clock time.
     """
@@ -164,7 +164,7 @@ def read_images(settings: Settings) -> dict[str, Image]:
 
 
 def side_for(image: Image, corners: str) -> int:
-    """Return the side of the largest square window that stays inside, however it is turned."""
+    """Return the side of the largest square window that stays inside at every rotation."""
     side = min(image.shape)
     if corners == WHOLE:
         side = int((side - 3 * LARGEST_SHIFT_PX) / np.sqrt(2))
@@ -172,7 +172,7 @@ def side_for(image: Image, corners: str) -> int:
 
 
 def search_all(settings: Settings, report: Callable[[str], None] = print) -> list[Found]:
-    """Put poses into all images and search for them."""
+    """Put poses between windows of all images, and search for them."""
     found = []
     for seed, (name, image) in enumerate(read_images(settings).items()):
         for range_ in RANGES:
@@ -197,7 +197,7 @@ def search_all(settings: Settings, report: Callable[[str], None] = print) -> lis
 
 
 def variants(range_: Range) -> list[tuple[str, float]]:
-    """Return which corners and noise a range is run with."""
+    """Return the corners and noise variances that a range is run with."""
     whole = [(WHOLE, variance) for variance in NOISE_VARIANCES]
     return [*whole, (MASKED, 0.0), (BLACK, 0.0)] if range_ is SMALL else whole
 
@@ -238,7 +238,7 @@ def search(
     similarity: str,
     limits: SearchLimits,
 ) -> Found:
-    """Put a pose into an image and search for it."""
+    """Put a pose between two windows of an image, and search for it."""
     reference, input = injection.windows(image, shape)
     with threads(1) as context:
         started = time.perf_counter()
@@ -266,7 +266,7 @@ def search(
 
 
 def goals(found: Sequence[Found], enough: bool) -> list[Goal]:
-    """Return the goals and what was found; reached is None if not `enough` was run."""
+    """Return the goals, with their results; `reached` is None if not `enough` was run."""
     made = []
     for range_ in RANGES:
         for method in range_.methods:
@@ -292,7 +292,7 @@ def goals(found: Sequence[Found], enough: bool) -> list[Goal]:
 
 
 def errors_table(found: Sequence[Found]) -> Table:
-    """Return median and largest errors by what was searched and how."""
+    """Return median and largest errors by range, method and degradation."""
     groups: dict[tuple[Any, ...], list[Found]] = {}
     for one in found:
         key = (one.method, one.range, one.corners, one.noise_variance, one.similarity)
@@ -330,7 +330,7 @@ def _median_and_largest(errors: Sequence[float]) -> list[str]:
 
 
 def thesis_table(found: Sequence[Found]) -> Table:
-    """Return [Patel2017] tables 3.3 and 3.4 as errors, beside ours; `found` as searched."""
+    """Return the errors of [Patel2017] tables 3.3 and 3.4 beside ours; `found` in search order."""
     rows = []
     for index, estimates in enumerate(ESTIMATES):
         own = found[index * len(ACTUAL) : (index + 1) * len(ACTUAL)]

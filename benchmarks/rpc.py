@@ -1,4 +1,4 @@
-"""Refined RPCs: real ones with known biases, and half-real images matched with real SAR images."""
+"""Refined RPCs: real RPCs with known biases, and half-real images matched with real SAR images."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from .tables import accuracy_table
 
 HALF_REAL, ROUND_TRIP, BLUNDERS = "half real", "round trip", "blunders"
 RURAL, URBAN = "simulated, hills", "simulated, town"
-# With the brightest part of the reference masked, as in [Suri2010] 4.5.
+# The variant that masks the brightest part of the reference, as in [Suri2010] 4.5.
 HALF_REAL_MASKED = "half real, thresholds"
 DENSITY = {RURAL: "rural", URBAN: "urban"}
 GOAL_PX = {RURAL: 1.0, URBAN: 2.0}
 
-# Simulated RPCs are wrong by up to so much on the ground.
+# Largest error of simulated RPCs on the ground.
 _LARGEST_SHIFT_M = 300.0
 _NEAR_PX = 2.0
 
-# Control points of the round trip: how many, how well measured, and how many are wrong by how much.
+# Control points of the round trip: their number and accuracy; share and size of blunders.
 _POINTS = 100
 _NOISE_PX = 0.3
 _BLUNDERS = 0.3
@@ -52,7 +52,7 @@ _SIZE = (6000, 5000)
 
 @dataclass(frozen=True)
 class HalfRealCase:
-    """A half-real image with biased RPCs, refined by the real SAR image."""
+    """A half-real image whose biased RPCs are refined by the real SAR image."""
 
     data: Path
     place: str
@@ -66,11 +66,11 @@ class HalfRealCase:
 
     @property
     def sensor(self) -> str:
-        """Which real RPCs: they take turns."""
+        """Source of the real RPCs; sources alternate."""
         return tuple(SENSORS)[(PLACES.index(self.place) + self.number) % len(SENSORS)]
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the scene, refine its RPCs and judge them by the true ones."""
+        """Make the scene, refine its RPCs, and judge them by the true ones."""
         with tempfile.TemporaryDirectory() as folder:
             scene = make_scene(
                 place_case(self.data, self.place),
@@ -128,7 +128,7 @@ class SimulatedCase:
         return f"{self.group}, seed {self.seed}"
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the scene, refine its RPCs and judge them at the check points."""
+        """Make the scene, refine its RPCs, and judge them at the check points."""
         with tempfile.TemporaryDirectory() as folder:
             scene = Path(folder)
             random = np.random.default_rng(self.seed)
@@ -174,7 +174,7 @@ class SimulatedCase:
 
 
 def near_the_truth(misses_px: FloatArray) -> str:
-    """Return in words how many points lie near the truth."""
+    """Return in words the number of points near the truth."""
     near = float((np.hypot(*misses_px.T) < _NEAR_PX).mean())
     return f"{near:.0%} of the kept points within {_NEAR_PX:g} px of the truth"
 
@@ -186,19 +186,19 @@ def crs_of(path: Path) -> CRS:
 
 
 def misses(rpc: RPC, table: Path, crs: CRS) -> FloatArray:
-    """Return measured minus projected positions of the points of a table, (n, 2)."""
+    """Return measured minus projected positions of a table's points, (n, 2)."""
     x, y, height = _columns(table, "reference_x", "reference_y", "height_m").T
     lon_lat = reproject(np.column_stack([x, y]), crs, LON_LAT)
     return image_positions(table) - rpc.project(lon_lat, height)
 
 
 def image_positions(table: Path) -> FloatArray:
-    """Return the image positions (col, row) of the points of a table, (n, 2)."""
+    """Return the image positions (col, row) of a table's points, (n, 2)."""
     return _columns(table, "input_col", "input_row")
 
 
 def _columns(table: Path, *names: str) -> FloatArray:
-    """Return columns of a table of points; of those that a fit saw, what it kept counts."""
+    """Return columns of a table of points; after a fit, only of the points that it kept."""
     with table.open(newline="") as file:
         kept = {"state": "used", "role": "fit"}
         rows = [
@@ -216,7 +216,7 @@ def rms(off_px: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class RoundTripCase:
-    """Real RPCs, a known bias, and measured control points, some of which may be wrong."""
+    """Real RPCs, a known bias, and measured control points, some of which may be blunders."""
 
     data: Path
     sensor: str
@@ -225,11 +225,11 @@ class RoundTripCase:
 
     @property
     def group(self) -> str:
-        """With which others it is counted."""
+        """Group that the case is counted in."""
         return BLUNDERS if self.wrong else ROUND_TRIP
 
     def run(self, workers: int | None) -> Outcome:
-        """Refine, with and without blunders, and compare with the truth or with each other."""
+        """Refine, with and without blunders, and compare with the truth or between the two."""
         truth = sensor_rpc(self.data, self.sensor)
         truth = truth.shifted(np.array(_SIZE) / 2 - truth.image_offset)
         bias = bias_of(self.number, _SIZE)
@@ -341,7 +341,7 @@ def run(settings: Settings) -> SuiteResult:
 def goals(
     half_real: Sequence[Outcome], round_trip: Sequence[Outcome], blunders: Sequence[Outcome]
 ) -> tuple[Goal, ...]:
-    """Return the goals and what was found."""
+    """Return the goals, with their results."""
     right, refused = count(half_real, CORRECT), count(half_real, REFUSED)
     return (
         Goal(
@@ -367,7 +367,7 @@ def goals(
 
 
 def simulated_goal(group: str, outcomes: Sequence[Outcome]) -> Goal:
-    """Return the goal of simulated scenes of one kind and what was found."""
+    """Return the goal of simulated scenes of one kind, with its result."""
     right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
     return Goal(
         f"{group}: error at check points",

@@ -1,4 +1,4 @@
-"""Dense cities seen by a push-broom camera: RPCs and ground control must be right or refused."""
+"""Dense cities in push-broom images: RPCs and ground control must be right or refused."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ CORRECT_PX, WRONG_PX = 2.0, 3.0
 
 @dataclass(frozen=True)
 class Run:
-    """A tool, the file that it writes, and the parameters that differ from their defaults.
+    """A tool, its output file, and the parameters that differ from their defaults.
 
-    Those that are paths name a file of the scene.
+    Parameters that are paths name a file of the scene.
     """
 
     tool: str
@@ -46,7 +46,7 @@ class Run:
         return {name: scene / v if isinstance(v, Path) else v for name, v in given}
 
     def call(self, scene: Path, output: Path, workers: int | None) -> Any:
-        """Return what the tool makes of the scene in a folder."""
+        """Run the tool on the scene in a folder."""
         return getattr(groundtie, self.tool)(
             image=scene / "sensor.tif",
             reference=scene / "reference.tif",
@@ -69,7 +69,7 @@ RUNS = {
 
 @dataclass(frozen=True)
 class City:
-    """A dense city of `simulate_sensor`, with defaults for all else."""
+    """A dense city of `simulate_sensor`, otherwise with default parameters."""
 
     size: int
     looks: float
@@ -77,11 +77,11 @@ class City:
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name for display."""
         return f"city {self.size}², {self.looks:g} looks, seed {self.seed}"
 
     def scene(self, cache: Path) -> Path:
-        """Return the folder of the scene, which is made unless the folder `cache` has it."""
+        """Return the folder of the scene; it is made unless the folder `cache` has it."""
         parts = self.size, f"{self.looks:g}", self.seed, simulator_version()
 
         def make(folder: Path) -> None:
@@ -107,11 +107,11 @@ class CityCase:
 
     @property
     def group(self) -> str:
-        """With which others it is counted."""
+        """Group that the case is counted in."""
         return group_name(self.what, self.city.size, self.city.looks)
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the scene if need be, run the tool, and judge what it found by the truth."""
+        """Make the scene if needed, run the tool, and judge its output by the truth."""
         scene, name = self.city.scene(self.cache), f"{self.what}, {self.city.name}"
         with tempfile.TemporaryDirectory() as folder:
             wanted = RUNS[self.what]
@@ -138,7 +138,7 @@ class CityCase:
 
 
 def group_name(what: str, size: int, looks: float) -> str:
-    """Return the name of the cities that are counted together."""
+    """Return the name of the group a city is counted in."""
     return f"{what}, {size} px, {looks:g} looks"
 
 
@@ -150,9 +150,9 @@ def true_error_px(scene: Path, output: Path) -> float:
     scene
         Folder of `simulate_sensor`.
     output
-        Refined RPCs, which are compared with the check points; or ground control points, of which
-        the affine change of the image that fits them best is: what they would do to RPCs, which
-        errors that are different for each point would not.
+        Refined RPCs, or ground control points. RPCs are compared with the check points directly. Of
+        ground control points, the best-fitting affine change of the image is compared, as that is
+        what would enter RPCs; errors that differ from point to point would not.
     """
     crs = crs_of(scene / "reference.tif")
     checks = scene / "check_points.csv"
@@ -169,7 +169,7 @@ def _terms(px: FloatArray) -> FloatArray:
 
 
 def judge(error_px: float) -> str:
-    """Return what an accepted result is: so near, so far, or wrong."""
+    """Return the verdict on an accepted result by its error."""
     if error_px <= CORRECT_PX:
         return CORRECT
     return INACCURATE if error_px <= WRONG_PX else SILENTLY_WRONG
@@ -186,7 +186,7 @@ def cases(settings: Settings) -> list[CityCase]:
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     wanted = cases(settings)
-    # Before all, so that processes do not make the same scene at the same time.
+    # Made first, so that no two processes make the same scene at the same time.
     for city in dict.fromkeys(case.city for case in wanted):
         city.scene(settings.cache)
     outcomes = run_cases(wanted, settings.jobs)
@@ -209,7 +209,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(kinds: Mapping[str, Sequence[Outcome]]) -> tuple[Goal, ...]:
-    """Return the goals and what was found."""
+    """Return the goals, with their results."""
     return tuple(
         Goal(
             f"{what}: accepted though more than {WRONG_PX:g} px wrong",
@@ -225,7 +225,7 @@ def goals(kinds: Mapping[str, Sequence[Outcome]]) -> tuple[Goal, ...]:
 def verdict_table(
     groups: Mapping[str, Sequence[Outcome]], title: str = "By size and looks"
 ) -> Table:
-    """Return what became of each group of cities."""
+    """Return the outcomes of each group of cities."""
     verdicts = (CORRECT, INACCURATE, SILENTLY_WRONG, REFUSED, CRASHED)
     rows = [
         [

@@ -73,7 +73,7 @@ def time_points(settings: Settings, times: int, orthority: Path | None) -> list[
 
 
 def _in_threads(work: Callable[..., FloatArray], *points: FloatArray) -> list[FloatArray]:
-    """Work on as many parts of some points at a time as there are threads, as tiles are worked."""
+    """Process points in as many parts at a time as there are threads, as tiles are processed."""
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(work, *(np.array_split(part, THREADS) for part in points)))
 
@@ -108,7 +108,7 @@ def _orthority_points(
 
 
 def goals(timings: Sequence[Timing]) -> list[Goal]:
-    """Return the goals and what was found."""
+    """Return the goals, with their results."""
     seconds = {(what, program): value for what, program, value, _ in timings}
     own = {what: seconds[what, OWN] for what in (FORWARD, INVERSE)}
     ratio = seconds[FORWARD, RASTERIO] / own[FORWARD]

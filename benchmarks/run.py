@@ -112,7 +112,7 @@ def _suite_names(text: str) -> tuple[str, ...]:
 
 
 def about(options: argparse.Namespace) -> dict[str, Any]:
-    """Return what the figures depend on besides the cases."""
+    """Return the conditions that the figures depend on besides the cases."""
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"],
         cwd=HERE,
@@ -139,7 +139,7 @@ def load_suite(name: str) -> ModuleType:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run suites, print and write their results; return 1 if the tool crashed, else 0."""
     options = parse(arguments)
-    # Not before: help is for those, too, who have not installed anything yet.
+    # Imported here so that help works before anything is installed.
     from benchmarks.ablation import leave_out
     from benchmarks.accuracy import CRASHED
     from benchmarks.cases import data_folder
@@ -175,6 +175,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    # Run as a file, Python looks for modules beside it; the benchmarks are a package.
+    # A script's own folder comes first on the path, but the benchmarks are a package.
     sys.path[0] = str(HERE.parent)
     raise SystemExit(main())

@@ -56,7 +56,7 @@ class Comparison:
 
     @property
     def difference_px(self) -> float:
-        """Largest distance between positions, input pixels; NaN unless both were accepted."""
+        """Largest distance between positions in input pixels; NaN unless both were accepted."""
         import numpy as np
 
         if self.base.positions is None or self.now.positions is None:
@@ -68,7 +68,7 @@ class Comparison:
         return float(np.hypot(*off.T).max())
 
     def is_same(self, tolerance_px: float) -> bool:
-        """Return whether the verdict is the same, and the transform if there is one."""
+        """Return whether the verdicts agree, and the transforms, if any."""
         if self.base.verdict != self.now.verdict:
             return False
         return not self.difference_px > tolerance_px
@@ -89,12 +89,12 @@ class Comparison:
 
 
 class Kept:
-    """Results of a revision, kept in a file, which is written after each of them.
+    """Results of a revision, kept in a file that is written after each of them.
 
     Raises
     ------
     SystemExit
-        The file holds those of another revision.
+        The file holds results of another revision.
     """
 
     def __init__(self, path: Path, revision: str) -> None:
@@ -110,7 +110,7 @@ class Kept:
             self._records = {record.name: record for record in records}
 
     def get(self, name: str) -> Record | None:
-        """Return the result of a name, if there is one."""
+        """Return the result with a name, if there is one."""
         return self._records.get(name)
 
     def add(self, record: Record) -> None:
@@ -121,7 +121,7 @@ class Kept:
             "records": [known.to_json() for known in self._records.values()],
         }
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        # Whoever stops the run in the middle of writing loses nothing.
+        # Stopping the run in the middle of writing loses nothing.
         partial = self._path.with_suffix(".partial")
         partial.write_text(json.dumps(values), encoding="utf-8")
         partial.replace(self._path)
@@ -147,7 +147,7 @@ def checked_out(revision: str) -> Iterator[Path]:
 
 
 def check_package(tree: Path) -> None:
-    """Stop unless Python finds the package of a source tree there."""
+    """Stop unless Python finds the package in the given source tree."""
     from benchmarks.same_runs import environment
 
     code = "import groundtie; print(groundtie.__file__)"
@@ -171,7 +171,7 @@ def run_all(
     known: Mapping[str, Record | None] | None = None,
     keep: Callable[[Record], None] | None = None,
 ) -> list[Record]:
-    """Run registrations by a source tree, without those that are known already."""
+    """Run registrations with a source tree, except those already known."""
     from benchmarks.same_runs import run_in
 
     check_package(tree)
@@ -203,9 +203,9 @@ def report(comparisons: Sequence[Comparison], tolerance_px: float) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare, print and return 1 if something differs, else 0."""
+    """Compare, print, and return 1 if something differs, else 0."""
     options = parse(arguments)
-    # Not before: help is for those, too, who have not installed anything yet.
+    # Imported here so that help works before anything is installed.
     from benchmarks.cases import data_folder
     from benchmarks.same_runs import registrations
 
@@ -230,6 +230,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    # Run as a file, Python looks for modules beside it; the benchmarks are a package.
+    # A script's own folder comes first on the path, but the benchmarks are a package.
     sys.path[0] = str(HERE.parent)
     raise SystemExit(main())

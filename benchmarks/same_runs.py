@@ -1,7 +1,7 @@
 """Registrations of all real pairs by the command line, as any revision offers it.
 
-Nothing is used but arguments and options that all revisions share, and nothing is read but exit
-codes, transforms and RPCs: two revisions can be compared whatever lies between them.
+Only arguments and options that all revisions share are used, and only exit codes, transforms and
+RPCs are read. Thus any two revisions can be compared.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Prepared:
     inputs
         The files that are read.
     positions
-        Returns input pixels, shape (n, 2), at a lattice of the ground, of what was found.
+        Returns the result's input pixels, shape (n, 2), on a lattice of the ground.
     """
 
     words: Sequence[str]
@@ -73,7 +73,7 @@ class Registration(Protocol):
 
     @property
     def name(self) -> str:
-        """Which pair by which tool."""
+        """The pair and the tool."""
 
     def prepare(self, folder: Path) -> Prepared:
         """Write what is needed into a folder."""
@@ -81,7 +81,7 @@ class Registration(Protocol):
 
 @dataclass(frozen=True)
 class PairRegistration:
-    """A real pair: with a made-up, wrong georeferencing, or as it is."""
+    """A real pair, with synthetic, wrong georeferencing or unchanged."""
 
     tool: str
     case: RealCase
@@ -93,7 +93,7 @@ class PairRegistration:
         return f"{self.tool} {self.case.name}{'' if self.georeferenced else ', as it is'}"
 
     def prepare(self, folder: Path) -> Prepared:
-        """Write the pair if need be."""
+        """Write the pair if needed."""
         case, found = self.case, folder / _TRANSFORM
         size, options = image_size(case.reference), ["--transform", str(found)]
         if self.georeferenced:
@@ -113,7 +113,7 @@ class PairRegistration:
 
 @dataclass(frozen=True)
 class RpcRefinement:
-    """An optical image seen by real RPCs with a known bias, refined by the real SAR image."""
+    """An optical image with real RPCs and a known bias, refined by the real SAR image."""
 
     data: Path
     place: str
@@ -121,7 +121,7 @@ class RpcRefinement:
 
     @property
     def sensor(self) -> str:
-        """Which real RPCs: they take turns."""
+        """Source of the real RPCs; sources alternate."""
         return tuple(SENSORS)[(PLACES.index(self.place) + self.number) % len(SENSORS)]
 
     @property
@@ -145,7 +145,7 @@ class RpcRefinement:
 
 
 def _ground(rpc: RPC, size: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
-    """Return places (longitude, latitude) all over an image, low and high, and their heights."""
+    """Return places (longitude, latitude) over the whole image, low and high, and their heights."""
     px = np.tile(lattice(size), (2, 1))
     side = np.repeat([-0.5, 0.5], len(px) // 2)
     height = rpc.offset[2] + side * rpc.scale[2]
@@ -172,20 +172,20 @@ def registrations(data: Path) -> list[Registration]:
 
 @dataclass(frozen=True)
 class Record:
-    """What became of a registration.
+    """The outcome of a registration.
 
     Parameters
     ----------
     name
-        Which one.
+        Name of the registration.
     inputs
-        Fingerprint of the files that were read: only records with the same one can be compared.
+        Fingerprint of the input files: only records with the same one are comparable.
     verdict, reason
-        One of `ACCEPTED`, `REFUSED`, `FAILED`, and what the tool gives as its reason.
+        One of `ACCEPTED`, `REFUSED`, `FAILED`, and the tool's reason.
     positions
-        Input pixels at a lattice of the ground; None unless it was accepted.
+        Input pixels on a lattice of the ground; None unless accepted.
     seconds
-        Time of the whole process.
+        Wall-clock time of the whole process.
     """
 
     name: str
@@ -196,13 +196,13 @@ class Record:
     seconds: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return values that JSON can carry, every bit of the positions included."""
+        """Return values that JSON can carry, with every bit of the positions."""
         positions = None if self.positions is None else self.positions.tolist()
         return {**asdict(self), "positions": positions}
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Record:
-        """Return the record that `to_json` described."""
+        """Return the record from the output of `to_json`."""
         positions = values["positions"]
         return cls(**{**values, "positions": None if positions is None else np.array(positions)})
 
@@ -212,7 +212,7 @@ class Record:
 
 
 def run_in(tree: Path, registration: Registration, known: Record | None = None) -> Record:
-    """Run a registration by the source tree in a folder; return what is known if it still holds."""
+    """Run a registration with the source tree in a folder; return `known` if it still holds."""
     with tempfile.TemporaryDirectory() as folder:
         prepared = registration.prepare(Path(folder))
         inputs = _fingerprint(prepared)
@@ -240,7 +240,7 @@ def environment(tree: Path) -> dict[str, str]:
 
 
 def _fingerprint(prepared: Prepared) -> str:
-    """Return a fingerprint of the files and of how they are registered."""
+    """Return a fingerprint of the files and of the command."""
     digest = hashlib.sha256()
     for path in prepared.inputs:
         digest.update(path.read_bytes())
@@ -249,7 +249,7 @@ def _fingerprint(prepared: Prepared) -> str:
 
 
 def _reason(done: subprocess.CompletedProcess[str]) -> str:
-    """Return the verdict's reason; the last line of what went wrong where there is no verdict."""
+    """Return the verdict's reason; without a verdict, the last line of the error output."""
     try:
         return str(json.loads(done.stdout)["verdict"]["reason"])
     except (json.JSONDecodeError, KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""Simulated pairs of radar images: one place seen twice, from other sides, at other times."""
+"""Simulated pairs of radar images: one place from two viewing directions at two times."""
 
 from __future__ import annotations
 
@@ -36,35 +36,35 @@ from .attempt import Pair
 from .cases import CRS, write_image
 from .simulations import fingerprint, kept, read_exact, simulator_version
 
-# How the second image differs: incidence angles, the share of buildings that stand in one image
-# only, and of parcels (fields, woods) that shine otherwise, by up to so much.
+# Differences of the second image: incidence angles; the share of buildings that stand in only one
+# image; the share of parcels (fields, woods) with other backscatter, and its largest change.
 INCIDENCES_DEG = (30.0, 40.0)
 CHANGED_BUILDINGS = 0.1
 _CHANGED_PARCELS, _CHANGE_DB = 0.3, 4.0
 
-# The second image's textures and speckle are others.
+# Seed offset of the second image's textures and speckle.
 _LATER = 100_000
 
 _GROUND = "ground.tif"
 
-# The input may be off by this, so ground nearer to what leans in it is left out, too.
+# The input may be displaced by this, so ground this near to layover or shadow is excluded, too.
 _BESIDE_PX = 8
 
 
 @dataclass(frozen=True)
 class SarPair:
-    """What a simulated pair of radar images is made from.
+    """The parameters of a simulated pair of radar images.
 
     Parameters
     ----------
     size, density, seed
         See `groundtie.simulate`; pixels are of 1 m.
     looks
-        Of both images.
+        Looks of both images.
     opposite
-        Whether they look from opposite sides, from an ascending and a descending orbit.
+        Whether the images look from opposite sides, from an ascending and a descending orbit.
     relief_m
-        Height of the hills; both images are corrected with a terrain model.
+        Height of the hills; both images are terrain-corrected.
     """
 
     size: int
@@ -76,18 +76,18 @@ class SarPair:
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name for display."""
         sides = "opposite orbits" if self.opposite else "same orbit"
         return f"{self.density} {self.size}², {self.looks} looks, {sides}, seed {self.seed}"
 
     def pair(self, cache: Path) -> Pair:
-        """Return the pair, which is made unless the folder `cache` has it."""
+        """Return the pair; it is made unless the folder `cache` has it."""
         words = "-".join(f"{value}" for value in asdict(self).values())
         folder = cache / f"sar-{words}-{simulator_version()}-{fingerprint([Path(__file__)])}"
         return read_exact(kept(folder, self._write))
 
     def ground(self, cache: Path) -> Path:
-        """Return the mask of the level ground on the reference, once the pair is made."""
+        """Return the mask of the level ground on the reference; the pair must exist."""
         return self.pair(cache).reference.with_name(_GROUND)
 
     def _write(self, folder: Path) -> None:
@@ -101,7 +101,7 @@ class SarPair:
         distortion = DistortionOptions("affine", shift_px=12.0, warp_px=4.0)
         model = draw_misregistration(distortion, grid, self.seed)
         truth = Transform(model, grid.crs, grid)
-        # What the second image shows beyond the first is part of the scene that is rendered.
+        # The rendered scene includes what the second image shows beyond the first.
         around = needed_margin(model, grid, grid)
         options = SceneOptions(
             (self.size + 2 * around,) * 2,
@@ -124,7 +124,7 @@ class SarPair:
         wide = grid.window(-around, -around, *options.size_px)
         positions = Positions.interpolated(truth, wide)
         seen = resample(sar_power(_changed(later), second), positions)
-        # Bright points ring when they are resampled: nothing is darker than the noise floor.
+        # Bright points ring under resampling, so values are clipped at the noise floor.
         power = add_speckle(np.maximum(seen, np.float32(NOISE_FLOOR)), looks, speckle[1])
         write_image(
             quantise_amplitude(power, second)[None], grid.transform, folder / NAMES["input"]
@@ -137,7 +137,7 @@ class SarPair:
 
 
 def _hidden(scene: Scene, sar: SarOptions) -> NDArray[np.bool_]:
-    """Return what of the ground an image does not show: under layover, in shadow, built upon."""
+    """Return the ground hidden in an image: under layover, in radar shadow or built upon."""
     tangent = math.tan(math.radians(sar.incidence_deg))
     height_px = scene.object_m / scene.pixel_size_m
     towards = sar.towards_radar
@@ -160,7 +160,7 @@ def _changed(scene: Scene) -> Scene:
 
 
 def _reach_px(options: SceneOptions) -> int:
-    """Return how far from its foot a building or a hill shows in a radar image."""
+    """Return how far from its foot a building or hill can appear in a radar image."""
     tangent = math.tan(math.radians(min(INCIDENCES_DEG)))
     height = options.highest_object_m + options.relief_m
     return math.ceil(height / tangent + options.highest_object_m * tangent) + 1

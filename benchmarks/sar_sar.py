@@ -25,11 +25,11 @@ from .tables import accuracy_table
 TOOL = "match_sar_sar"
 SAR_SAR = "sar-sar"
 
-# Cases whose images are turned by 18°: they are matched without georeferencing, too.
+# Cases whose images are rotated by 18°: they are also matched without georeferencing.
 _TURNED = ("ss-ponds", "ss-meander")
 FREE = "without georeferencing"
 
-# The larger images are matched in pixels of four times as many looks, too.
+# The larger images are also matched in pixels of four times as many looks.
 _MANY_LOOKS_M = 2.0
 
 # Masks of simulated pairs: the simulator's ground, homogeneous regions of the reference, none.
@@ -49,7 +49,7 @@ _LONGEST_S = 15.0
 
 @dataclass(frozen=True)
 class SimulatedAttempt:
-    """A simulated pair, with one of `MASKS`."""
+    """A simulated pair with one of `MASKS`."""
 
     simulation: SarPair
     mask: str
@@ -61,7 +61,7 @@ class SimulatedAttempt:
         return _group(self.simulation.opposite, self.mask)
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair = self.simulation.pair(self.cache)
         given: dict[str, Any] = {}
         if self.mask == _TRUE:
@@ -78,7 +78,7 @@ def _group(opposite: bool, mask: str) -> str:
 
 
 def simulations(seeds: range) -> list[SarPair]:
-    """Return pairs of both kinds of orbits; density and looks go round with the seed."""
+    """Return pairs of both orbit combinations; density and looks cycle with the seed."""
     return [
         SarPair(
             _SIZE_PX,
@@ -130,7 +130,7 @@ def run(settings: Settings) -> SuiteResult:
         ),
         "simulated": run_cases(simulated, settings.jobs),
     }
-    # By itself: it is timed.
+    # Run alone, as it is timed.
     large = SimulatedAttempt(SarPair(_LARGE_PX, "rural", 1, 4, True), _TRUE, settings.cache)
     large.simulation.pair(settings.cache)
     outcomes["large"] = run_cases([large], 1)
@@ -193,7 +193,7 @@ def _counts(
 
 
 def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals on real pairs and what was found."""
+    """Return the goals on real pairs, with their results."""
     right, refused = count(outcomes, CORRECT), count(outcomes, REFUSED)
     free = [outcome for outcome in outcomes if outcome.group == FREE]
     found = f"{right} of {len(outcomes)}, {refused} refused"
@@ -217,7 +217,7 @@ def real_goals(outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
 def other_goals(
     crossed: Sequence[Outcome], groups: dict[str, list[Outcome]], large: Outcome
 ) -> tuple[Goal, ...]:
-    """Return the goals on crossings and simulated pairs and what was found."""
+    """Return the goals on crossings and simulated pairs, with their results."""
     refused = count(crossed, REFUSED)
     goals = [
         Goal("Crossings: refused", "all", f"{refused} of {len(crossed)}", refused == len(crossed))
@@ -248,7 +248,7 @@ def other_goals(
 
 
 def _reasons(outcomes: Sequence[Outcome]) -> Table:
-    """Return why simulated pairs were refused, and errors of what was accepted."""
+    """Return why simulated pairs were refused, and the errors of accepted ones."""
     rows = []
     for group in dict.fromkeys(outcome.group for outcome in outcomes):
         own = [outcome for outcome in outcomes if outcome.group == group]

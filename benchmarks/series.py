@@ -1,4 +1,4 @@
-"""Series of many dates: how closely they agree, who is left out, how long it takes."""
+"""Series of many dates: their mutual consistency, the dates left out, and the processing time."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _LARGEST_PX, _LARGEST_SHARE, _MOST_REFUSED = 0.3, 0.6, 0.1
 _TIMED_DATES = 10
 _MOST_SEEDS = 3
 
-# Bands of which each two real dates on one grid are registered, and how closely these lie there, as
-# Landsat's level 2 does, in pixels.
+# Bands in which every two real dates on one grid are registered, and the expected consistency of
+# these dates in pixels, as Landsat's level 2 has it.
 _BANDS, _GRID_PX = (1, 4), 0.5
 
-# Known shifts that are put into the georeferencing of real dates, in pixels.
+# Known shifts added to the georeferencing of real dates, in pixels.
 _INJECTED_PX = (
     (0, 0),
     (3, -2),
@@ -48,23 +48,23 @@ _INJECTED_PX = (
 
 @dataclass(frozen=True)
 class Run:
-    """What became of one series.
+    """The outcome of one series.
 
     Parameters
     ----------
     name
-        Which.
+        Name of the series.
     good, registered, silently_wrong
-        How many dates belong to it, how many of these were registered (the reference among them),
-        and how many dates were registered wrong by more than 0.3 px, or do not belong.
+        Number of dates that belong to the series; number of these that were registered, including
+        the reference; number of dates registered wrong by more than 0.3 px, or not belonging.
     bad, named
-        How many do not belong, and how many of these were named.
+        Number of dates that do not belong, and number of these that were named.
     largest_px, median_px
-        By how much two good dates differ from the truth between them, rms; NaN: unknown truth.
+        Error between two good dates against the truth, rms; NaN: unknown truth.
     pairs, refused
-        How many registrations of two good dates were tried, and how many of these were refused.
+        Number of registrations tried between good dates, and number of these that were refused.
     loops, closed, loop_median_px, loop_largest_px
-        Its loops.
+        Statistics of the loops.
     """
 
     name: str
@@ -165,7 +165,7 @@ def _judged(name: str, series: SimulatedSeries, reference: Path | None, out: Pat
     good = [k for k in series.good if stems[k] in placed]
     errors = np.array([placed[stems[k]] - series.displacement_px[k] for k in good])
     apart = pairwise_px(errors)
-    # Wrong is who differs from most of the others.
+    # A date is wrong if it differs from most of the others.
     wrong = int((np.median(apart, axis=1) > _LARGEST_PX).sum())
     bad = {stems[k] for k in (*series.elsewhere, *series.cloudy)}
     named = bad & {one.name for one in found.left_out}
@@ -207,7 +207,7 @@ def _as_it_is(name: str, files: list[Path], out: Path) -> Run:
 
 
 def _injected(files: list[Path], scratch: Path) -> Run:
-    """Register dates as they are, and with known shifts and two dates of another place."""
+    """Register dates unchanged, and with known shifts and two dates of another place."""
     before = _displacements(_registered(scratch / "before", files))
     moved = scratch / "moved"
     moved.mkdir()
@@ -238,7 +238,7 @@ def _injected(files: list[Path], scratch: Path) -> Run:
 
 
 def _on_one_grid(settings: Settings) -> list[Outcome]:
-    """Register each two dates of the river, which lie on one grid, band by band."""
+    """Register every two dates of the river, which lie on one grid, band by band."""
     files = sorted((settings.data / "series" / "river").glob("*.tif"))
     found = []
     for one, other in combinations(files[:2] if settings.quick else files, 2):
@@ -277,7 +277,7 @@ def _displacements(found: Any) -> dict[str, Any]:
 
 
 def _network(found: Any, good: set[str]) -> tuple[int, int, int, int, float, float]:
-    """Return how many pairs of good dates were tried and refused, and what loops there are."""
+    """Return the numbers of tried and refused pairs of good dates, and loop statistics."""
     tried = [pair for pair in found.pairs if {pair.first, pair.second} <= good]
     refused = sum(not pair.accepted for pair in tried)
     loops = found.loops()
@@ -288,7 +288,7 @@ def _network(found: Any, good: set[str]) -> tuple[int, int, int, int, float, flo
 
 
 def _time(settings: Settings) -> tuple[float, tuple[float, float]]:
-    """Return the processor time of a series over that of as many registrations, and both."""
+    """Return the processor time of a series relative to as many registrations, and both times."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         series = simulate_series(folder / "dates", settings.cache, 1, _TIMED_DATES + 1, ())

@@ -1,4 +1,4 @@
-"""Series of dates with exact truth: one simulated ground, seen anew on each date."""
+"""Series of dates with exact truth: one simulated ground, imaged anew on each date."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .cases import REFERENCE_TRANSFORM, read_image, write_image
 from .clouds import clouds_over, fractal
 from .simulations import Simulation
 
-# What the georeferencing of each date is wrong by: shift, and linear part at the borders.
+# Error of each date's georeferencing: shift, and linear part at the borders.
 _SHIFT_PX, _LINEAR_PX = 12.0, 0.5
 
-# Seasons: brightness changes by this share of the ground's range, in patches; and noise.
+# Seasonal change: share of the ground's range by which patches change; and noise.
 _SEASON, _NOISE = 0.25, 0.04
 _CLOUD_SHARE = 0.9
 
-# The ground goes on beyond the dates by this.
+# Margin of the ground beyond the dates.
 _MARGIN_PX = 40
 
 
@@ -38,10 +38,10 @@ class SimulatedSeries:
     files
         The dates.
     displacement_px
-        Where the georeferencing of each date has the ground: shift at the centre, and its rise to
-        the right and to the lower border, (x, y) each, shape (n, 6).
+        Displacement of the ground by the georeferencing of each date: shift at the centre, and its
+        increase to the right and to the lower border, (x, y) each, shape (n, 6).
     elsewhere, cloudy
-        Which dates show another place, and which clouds.
+        Dates that show another place, and dates that show clouds.
     size_px
         Side of a date.
     """
@@ -61,7 +61,7 @@ class SimulatedSeries:
 def simulate_series(
     folder: Path, cache: Path, seed: int, count: int, bad: Sequence[int], size: int = 560
 ) -> SimulatedSeries:
-    """Write a series; of the `bad` dates the first half show another place, the others clouds.
+    """Write a series; the first half of the `bad` dates show another place, the others clouds.
 
     Date 0 has the right georeferencing.
     """
@@ -90,14 +90,14 @@ def simulate_series(
 
 
 def pairwise_px(displacements: FloatArray) -> FloatArray:
-    """Return by how much each two of several errors (n, 6) differ, rms over a date, (n, n)."""
+    """Return the pairwise differences of several errors (n, 6), rms over a date, (n, n)."""
     apart = displacements[:, None] - displacements[None]
     squared = (apart.reshape(*apart.shape[:2], 3, 2) ** 2).sum(axis=-1)
     return np.asarray(np.sqrt(squared @ [1, 1 / 3, 1 / 3]))
 
 
 def write_moved(source: Path, target: Path, shift_px: tuple[float, float]) -> Path:
-    """Write a raster whose geotransform claims it to lie some pixels to the right and down."""
+    """Write a raster whose geotransform is shifted by some pixels to the right and down."""
     with rasterio.open(source) as raster:
         profile, values, transform = raster.profile, raster.read(), raster.transform
     profile["transform"] = compose(transform, Affine.translation(*shift_px))
@@ -107,7 +107,7 @@ def write_moved(source: Path, target: Path, shift_px: tuple[float, float]) -> Pa
 
 
 def aged(image: FloatArray, rng: np.random.Generator) -> np.ndarray:
-    """Return an image, 0 to 1, of another season: patches of other brightness, gain, noise."""
+    """Return an image, 0 to 1, in another season: patches of other brightness, gain, noise."""
     patches = np.round(fractal(image.shape, 3.0, rng))
     gain, gamma = rng.uniform(0.7, 1.0), rng.uniform(0.8, 1.25)
     seasonal = gain * np.clip(image, 0, 1) ** gamma + _SEASON * 0.5 * patches
@@ -123,7 +123,7 @@ def _ground(cache: Path, seed: int, size: int) -> FloatArray:
 
 
 def _seen(ground: FloatArray, displacement: FloatArray, size: int) -> FloatArray:
-    """Return what a date shows whose georeferencing is wrong by a displacement."""
+    """Return the image of a date whose georeferencing is wrong by a displacement."""
     half = size / 2
     rows, cols = np.mgrid[:size, :size].astype(float)
     nominal = np.stack([cols, rows], axis=-1)

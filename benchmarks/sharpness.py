@@ -1,9 +1,9 @@
-"""How sharply edges and steps coincide: of ground at its place, and of what is drawn over other.
+"""How sharply edges and steps coincide, for aligned ground and for drawn content over other ground.
 
-Ground at its place is that of all scenes of the red team, different bands of the shared series, of
-one date and of neighbouring ones: what cameras show of one ground in other colours; dates of
-simulated series; and radar images without their speckle, which nothing distinguishes from a
-camera's, with a camera's.
+Aligned ground comes from all scenes of the red team; from different bands of the shared series, of
+one date and of neighbouring dates, which show one ground in other colours; from dates of simulated
+series; and from despeckled radar images, which cannot be told from camera images, with camera
+images.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
 DESPECKLED = "despeckled radar with camera"
 SIMULATED_DATES, DATES = "simulated dates of one camera", "dates of one camera, years apart"
 
-# Series of other seeds than the suite series has, and dates of each.
+# Seeds that the series suite does not use, and the number of dates of each.
 _SERIES_SEEDS, _DATES = range(4, 9), 5
 
 _NOWHERE = np.zeros(PARAMETERS)
@@ -62,18 +62,18 @@ _NOWHERE = np.zeros(PARAMETERS)
 
 @dataclass(frozen=True)
 class Measured:
-    """What two arrays have the same where they lie on one another.
+    """The similarities of two arrays in alignment.
 
     Parameters
     ----------
     name
         Scene and seed, or attack.
     group
-        With which others it is counted.
+        Group of the pair.
     is_drawn
-        Whether something is drawn over ground that lies elsewhere.
+        Whether something is drawn over ground that is displaced.
     sameness
-        What they have the same.
+        The measured similarities.
     """
 
     name: str
@@ -82,17 +82,17 @@ class Measured:
     sameness: Sameness
 
     def line(self) -> str:
-        """Return what was measured as a line of text."""
+        """Return the measurement as a line of text."""
         return f"{self.name} ({self.group}): {self.sameness.sharpness:.2f}"
 
     def record(self) -> dict[str, Any]:
-        """Return what was measured as values that JSON can carry."""
+        """Return the measurement as values that JSON can carry."""
         return {**asdict(self), "sameness": plain(asdict(self.sameness))}
 
 
 @dataclass(frozen=True)
 class Case:
-    """A pair whose arrays are laid on one another."""
+    """A pair whose arrays coincide pixel by pixel."""
 
     name: str
     group: str
@@ -100,7 +100,7 @@ class Case:
     make: Callable[[], Pair]
 
     def run(self, workers: int | None) -> Measured:
-        """Make the pair and measure."""
+        """Make the pair and measure it."""
         with tempfile.TemporaryDirectory() as folder:
             self.make().save(Path(folder))
             images = Path(folder) / "r.tif", Path(folder) / "i.tif"
@@ -109,7 +109,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Bands:
-    """Two bands of rasters on one grid, the first and the last one's."""
+    """One band of each of two rasters on one grid."""
 
     reference: Path
     input: Path
@@ -123,7 +123,7 @@ class Bands:
             group = DATES
         name = f"{self.reference.stem} {self.band}, {self.input.stem} {self.other_band}"
         with tempfile.TemporaryDirectory() as folder:
-            # A raster is not compared with itself.
+            # A copy, as a raster is not compared with itself.
             images = self.reference, Path(shutil.copy(self.input, folder))
             bands = self.band, self.other_band
             return Measured(name, group, False, _sameness(*images, workers, *bands))
@@ -131,14 +131,14 @@ class Bands:
 
 @dataclass(frozen=True)
 class Dates:
-    """A date of a simulated series, and its first one."""
+    """A date of a simulated series, and its first date."""
 
     seed: int
     date: int
     cache: Path
 
     def run(self, workers: int | None) -> Measured:
-        """Simulate the series and measure."""
+        """Simulate the series and measure the dates."""
         with tempfile.TemporaryDirectory() as folder:
             series = simulate_series(Path(folder), self.cache, self.seed, _DATES, ())
             images = series.files[0], series.files[self.date]
@@ -180,7 +180,7 @@ def _despeckled(scene: Scene, seed: int, cache: Path) -> Pair:
 
 
 def bands_of_series(folder: Path) -> list[Bands]:
-    """Return bands of one exposure, and of dates that lie on one grid."""
+    """Return pairs of bands of one date, and of dates on one grid."""
     found = []
     for dates in ("fields", "river"):
         files = sorted((folder / "series" / dates).glob("*.tif"))
@@ -194,7 +194,7 @@ def bands_of_series(folder: Path) -> list[Bands]:
 
 
 def run(settings: Settings) -> SuiteResult:
-    """Measure all ground at its place, and `--sample` drawn pairs."""
+    """Measure all aligned ground, and `--sample` drawn pairs."""
     seeds = range(settings.first_seed, settings.first_seed + settings.seeds)
     bands = bands_of_series(settings.data)
     dates = [Dates(*at, settings.cache) for at in product(_SERIES_SEEDS, range(1, _DATES))]

@@ -18,40 +18,40 @@ SIZE_PX = 1000
 
 _WANTED_CORRECT = 0.95
 
-# Largest median error on the ground; dense urban scenes are reported only.
+# Largest wanted median error on the ground; dense urban scenes are reported only.
 _MEDIAN_ERROR_PX = {"rural": 0.3, "suburban": 0.7, "urban": None}
 
-# Shares of the buildings that stand in one image only, in percent.
+# Shares of the buildings that stand in only one image, in percent.
 REBUILT_PERCENT = (10.0, 20.0, 30.0)
 
-# Two radar images of one dense city, from an ascending and a descending orbit: nothing but the
-# ground lies alike in them.
+# Two radar images of one dense city, from an ascending and a descending orbit: only the ground
+# is alike in them.
 OPPOSITE = "city, opposite orbits"
 _OPPOSITE_PX, _MOST_LOOKS = 800, 4
 
 
 @dataclass(frozen=True)
 class SimulatedCase:
-    """A simulated pair, registered with default parameters; `group` names what it is one of."""
+    """A simulated pair, registered with default parameters."""
 
     simulation: Simulation | SarPair
     group: str
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair, simulation = self.simulation.pair(self.cache), self.simulation
         tool = "match_sar_sar" if isinstance(simulation, SarPair) else "coregister"
         return attempt(simulation.name, self.group, pair, workers, tool=tool)
 
 
 def rebuilt(density: str, percent: float) -> str:
-    """Return the name of the pairs of which a share of the buildings was rebuilt."""
+    """Return the name of the pairs in which a share of the buildings was rebuilt."""
     return f"{density}, {percent:g} % rebuilt"
 
 
 def changes(seeds: range, cache: Path) -> list[Case]:
-    """Return pairs between whose images time has passed, or that are seen from opposite sides."""
+    """Return pairs with changes between the images, or with opposite viewing directions."""
     cases: list[Case] = []
     for seed in seeds:
         for percent in REBUILT_PERCENT:
@@ -83,7 +83,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals for one density, or one kind of change, and what was found."""
+    """Return the goals for one density or one kind of change, with their results."""
     correct, median = count(outcomes, CORRECT), median_px(outcomes)
     largest = _MEDIAN_ERROR_PX.get(name)
     title = name.capitalize()

@@ -23,7 +23,7 @@ from .cases import image_size, read_check_points
 
 @dataclass(frozen=True)
 class Simulation:
-    """What a simulated pair is made from; see `groundtie.simulate`.
+    """The parameters of a simulated pair; see `groundtie.simulate`.
 
     Parameters
     ----------
@@ -41,16 +41,16 @@ class Simulation:
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name for display."""
         return f"{self.density} {self.size}², seed {self.seed}, shift {self.shift:g} px"
 
     def pair(self, cache: Path) -> Pair:
-        """Return the pair, which is made unless the folder `cache` has it."""
+        """Return the pair; it is made unless the folder `cache` has it."""
         folder = cache / "-".join(
             f"{part:g}" if isinstance(part, float) else str(part)
             for part in (self.density, self.size, self.shift, self.seed, *self._further())
         )
-        # The truth is there only if all files are.
+        # The truth exists only if all files do.
         if not (folder / files.NAMES["truth"]).exists():
             with _any_memory():
                 groundtie.simulate(
@@ -64,14 +64,14 @@ class Simulation:
         return read_pair(folder)
 
     def _further(self) -> list[str]:
-        """What else the folder's name must tell."""
+        """Further words of the folder's name."""
         digest = hashlib.sha256(repr(self.further).encode()).hexdigest()[:8]
         return ([digest] if self.further else []) + [simulator_version()]
 
 
 @contextmanager
 def _any_memory() -> Iterator[None]:
-    """Let simulations take more than the usual budget."""
+    """Allow simulations to exceed the usual memory budget."""
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = str(MOST_MB)
     try:
@@ -83,9 +83,9 @@ def _any_memory() -> Iterator[None]:
 
 
 def kept(folder: Path, make: Callable[[Path], object]) -> Path:
-    """Return a folder, which is made unless it is there.
+    """Return a folder; it is made if it does not exist.
 
-    Whole or not at all: a run may be stopped, and other processes may make it, too.
+    It appears complete or not at all: a run may be stopped, and other processes may make it, too.
     """
     if not folder.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -98,7 +98,7 @@ def kept(folder: Path, make: Callable[[Path], object]) -> Path:
 
 
 def read_exact(folder: Path) -> Pair:
-    """Return the pair in a folder whose truth is exact everywhere; files as of `read_pair`."""
+    """Return the pair in a folder whose truth is exact everywhere; files as in `read_pair`."""
     reference, image, truth = (folder / files.NAMES[key] for key in ("reference", "input", "truth"))
     mapping, size = on_pixels(groundtie.load_transform(truth), reference), image_size(reference)
     lattice = Truth.on_lattice(mapping, size, linear_of(mapping, size))
@@ -106,7 +106,7 @@ def read_exact(folder: Path) -> Pair:
 
 
 def read_pair(folder: Path) -> Pair:
-    """Return the pair in a folder that `groundtie.simulate` wrote."""
+    """Return the pair in a folder written by `groundtie.simulate`."""
     exact = read_exact(folder)
     points = read_check_points(folder / files.NAMES["check_points"])
     assert exact.truth is not None
@@ -115,7 +115,7 @@ def read_pair(folder: Path) -> Pair:
 
 def linear_of(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
     """Return input pixels per reference pixel around the centre, shape (2, 2)."""
-    # Far enough that terrain, which bends the truth from pixel to pixel, hardly counts.
+    # Far enough that terrain, which bends the truth from pixel to pixel, hardly matters.
     step = min(size) / 4
     steps = step * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     base, along_col, along_row = mapping(np.array(size) / 2 + steps)
@@ -128,5 +128,5 @@ def simulator_version() -> str:
 
 
 def fingerprint(paths: Iterable[Path]) -> str:
-    """Return what changes when one of some files does."""
+    """Return a fingerprint that changes with any of the files."""
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:8]

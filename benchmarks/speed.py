@@ -44,7 +44,7 @@ SIMPLEITK_METRIC = "SimpleITK Mattes metric"
 SIMPLEITK_AFFINE = "SimpleITK affine"
 AROSICS_LOCAL = "AROSICS local"
 
-# The surface that is compared.
+# The surface to be compared.
 RADIUS_PX = 20
 WINDOW_PX = 1000
 BINS = 64
@@ -56,7 +56,7 @@ _WANTED_RATIO = 60.0
 
 _LARGEST_SHIFT_PX = 20
 
-# A radar image, filtered and searched for its ground on one core.
+# A radar image that is filtered and searched for its ground on one core.
 RADAR_PX = 4000
 FILTER, FILTER_RATE = "speckle filter ", 20.0
 GROUND, GROUND_SECONDS = f"ground of a town, {RADAR_PX}×{RADAR_PX} px", 10.0
@@ -76,7 +76,7 @@ class Record:
 
 
 def peer_python(name: str) -> Path | None:
-    """Return the Python of a peer's environment, None if it is not installed."""
+    """Return the Python of a peer's environment; None if it is not installed."""
     folder = ENVIRONMENTS / name
     return folder / "bin" / "python" if (folder / ".installed").exists() else None
 
@@ -108,7 +108,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def simulated(settings: Settings, size: int) -> Pair:
-    """Return a simulated pair; it is made in a process that ends and frees its memory."""
+    """Return a simulated pair, made in a process that ends and frees its memory."""
     simulation = Simulation(size, "suburban", _SEED)
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         return pool.submit(simulation.pair, settings.cache).result()
@@ -137,7 +137,7 @@ def time_surfaces(settings: Settings, times: int) -> list[Record]:
 
 
 def surface_shifts(step_px: int) -> int:
-    """Return the number of shifts of the surface that are so many pixels apart."""
+    """Return the number of shifts of the surface at this spacing in pixels."""
     return (2 * (RADIUS_PX // step_px) + 1) ** 2
 
 
@@ -185,13 +185,13 @@ def own_command(pair: Pair) -> list[str]:
 
 
 def record_of(what: str, program: str, measured: Measured, pair: Pair) -> Record:
-    """Return the record of a registration, with what it found."""
+    """Return the record of a registration, including its result."""
     note = describe_found(program, measured.output, pair)
     return Record(what, program, measured.seconds, measured.peak_bytes, note)
 
 
 def describe_found(program: str, output: str, pair: Pair) -> str:
-    """Return in words what a program's JSON, its last line of output or all of it, says."""
+    """Return in words the result in a program's JSON: its last line of output, or all of it."""
     assert pair.truth is not None
     if program == OWN:
         values = json.loads(output)
@@ -238,7 +238,7 @@ def time_radar(times: int) -> list[Record]:
 
 
 def _shortest(work: Callable[..., Any], times: int, *arguments: Any) -> float:
-    """Return the processor's time for work in this thread alone, whatever else the machine does."""
+    """Return the processor time for work in this thread alone, whatever else the machine does."""
     seconds = []
     for _ in range(times):
         started = time.thread_time()
@@ -248,7 +248,7 @@ def _shortest(work: Callable[..., Any], times: int, *arguments: Any) -> float:
 
 
 def radar_goals(records: Sequence[Record]) -> list[Goal]:
-    """Return the goals for what radar images need and what was found."""
+    """Return the goals for the processing of radar images, with their results."""
     goals = []
     for record in records:
         if record.what == GROUND:
@@ -263,7 +263,7 @@ def radar_goals(records: Sequence[Record]) -> list[Goal]:
 
 
 def surface_goal(records: Sequence[Record]) -> Goal:
-    """Return the goal for the surface and what was found."""
+    """Return the goal for the surface, with its result."""
     seconds = {record.program: record.seconds for record in records}
     what, wanted = "Surface against SimpleITK's metric", f"at least {_WANTED_RATIO:g} times faster"
     if SIMPLEITK_METRIC not in seconds:
@@ -274,7 +274,7 @@ def surface_goal(records: Sequence[Record]) -> Goal:
 
 
 def affine_goals(records: Sequence[Record]) -> list[Goal]:
-    """Return the goals for affine registrations and what was found."""
+    """Return the goals for affine registrations, with their results."""
     seconds = {record.program: record.seconds for record in records}
     goals = []
     for peer in (SIMPLEITK_AFFINE, AROSICS_LOCAL):
@@ -287,7 +287,7 @@ def affine_goals(records: Sequence[Record]) -> list[Goal]:
 
 
 def measurements(records: Sequence[Record]) -> Table:
-    """Return all measurements, with the peers that are not there."""
+    """Return all measurements, including peers that are not installed."""
     rows = [
         [
             record.what,

@@ -1,4 +1,4 @@
-"""What all suites share: settings, running many cases, and what a suite gives back."""
+"""The parts that all suites share: settings, the running of many cases, and results."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .attempt import Outcome, count
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is run, and how.
+    """The extent of a run.
 
     Parameters
     ----------
     quick
-        A few cases of each suite only: to see that it works, not to judge.
+        Run only a few cases of each suite: enough to see that it works, not to judge.
     seeds
         Number of simulated pairs of each kind.
     jobs
@@ -36,10 +36,10 @@ class Settings:
     first_seed
         The first of the seeds.
     classes
-        Of attacks, margins and calibration: which classes.
+        For attacks, margins and calibration: the classes to run.
     sample, named, save, large
-        Of attacks alone: how many cases, of all classes; which by their names; a folder for the
-        images; whether scenes are large.
+        For attacks alone: number of cases over all classes; names of cases; folder for the images;
+        whether scenes are large.
     """
 
     quick: bool
@@ -55,13 +55,13 @@ class Settings:
     large: bool = False
 
     def seed_numbers(self, most: int | None = None) -> range:
-        """Return the seeds, at most so many; quickly, it is one."""
+        """Return the seeds, at most a given number; one in quick runs."""
         number = min(self.seeds, most or self.seeds)
         return range(self.first_seed, self.first_seed + (1 if self.quick else number))
 
 
 class Case(Protocol):
-    """A case that a pool of processes can run; it must be possible to pickle it."""
+    """A case that a pool of processes can run; it must be picklable."""
 
     def run(self, workers: int | None) -> Outcome:
         """Register, judge and time; `workers` threads."""
@@ -69,14 +69,14 @@ class Case(Protocol):
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal and what was found.
+    """A goal and its result.
 
     Parameters
     ----------
     what, wanted, found
-        Text for people.
+        Text for display.
     reached
-        Whether the goal is reached; None: reported only, or not enough was run to tell.
+        Whether the goal is reached; None: reported only, or too few runs to tell.
     """
 
     what: str
@@ -86,24 +86,24 @@ class Goal:
 
 
 def none_wrong(what: str, outcomes: Sequence[Outcome]) -> Goal:
-    """Return the goal that no registration is silently wrong, and what was found."""
+    """Return the goal that no registration is silently wrong, with its result."""
     wrong = count(outcomes, SILENTLY_WRONG)
     return Goal(what, "none", f"{wrong} of {len(outcomes)}", wrong == 0)
 
 
 class Grouped(Protocol):
-    """What is counted with others."""
+    """A result that is counted in a group."""
 
     @property
     def group(self) -> str:
-        """Name of the cases that are counted together."""
+        """Name of the group the case is counted in."""
 
 
 G = TypeVar("G", bound=Grouped)
 
 
 def by_group(found: Iterable[G], names: Iterable[str] = ()) -> dict[str, list[G]]:
-    """Return what was found by its groups: those that are named first, then as they come."""
+    """Return results by group: named groups first, then the others in order of appearance."""
     groups: dict[str, list[G]] = {name: [] for name in names}
     for one in found:
         groups.setdefault(one.group, []).append(one)
@@ -116,7 +116,7 @@ C = TypeVar("C")
 def of_classes(
     cases: Sequence[C], classes: Sequence[str], names_of: Callable[[C], set[str]]
 ) -> list[C]:
-    """Return the cases of some classes, by any of their names; of no class, all.
+    """Return the cases of some classes, by any of their names; without classes, all cases.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class Table:
 
 @dataclass(frozen=True)
 class SuiteResult:
-    """What a suite found: goals, tables for people, records for programs, notes."""
+    """The results of a suite: goals, tables for display, records for programs, notes."""
 
     title: str
     goals: Sequence[Goal]
@@ -165,7 +165,7 @@ def run_cases(
         for index, case in enumerate(cases):
             done(index, case.run(None))
         return [o for o in outcomes if o is not None]
-    # Not forked: OpenCV's and GDAL's threads do not survive a fork.
+    # Spawned, as OpenCV's and GDAL's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, context, _begin, (left_out(),)) as pool:
         futures = {pool.submit(case.run, 1): index for index, case in enumerate(cases)}

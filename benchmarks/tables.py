@@ -1,4 +1,4 @@
-"""Results as Markdown for people and as JSON for programs."""
+"""Results as Markdown for readers and as JSON for programs."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def _accuracy_row(name: str, outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def error_cells(outcomes: Sequence[Outcome]) -> tuple[str, str]:
-    """Return the median and the largest error of what was accepted."""
+    """Return the median and the largest error of accepted registrations."""
     errors = [outcome.error_px for outcome in accepted(outcomes)]
     return (f"{np.median(errors):.2f}", f"{max(errors):.2f}") if errors else ("–", "–")
 
 
 def goals_table(goals: Sequence[Goal]) -> Table:
-    """Return goals and findings side by side."""
+    """Return goals and results side by side."""
     rows = [[g.what, g.wanted, g.found, _REACHED[g.reached]] for g in goals]
     return Table("Goals", ("", "goal", "found", "reached"), rows)
 

@@ -1,4 +1,4 @@
-"""[Patel2017], tables 3.3 and 3.4: what its Radon method found, without and with noise."""
+"""[Patel2017], tables 3.3 and 3.4: results of its Radon method, without and with noise."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 Triple = tuple[float, float, float]
 
-# Rotation in degrees and shift (x, y) in pixels that P put in, for every image.
+# Rotation in degrees and shift (x, y) in pixels that P applied to every image.
 ACTUAL: tuple[Triple, ...] = ((0, 20, 35), (20, 5, 17), (10, 35, 17), (25, 14, 30))
 
 # Columns and rows of P's images.
@@ -20,7 +20,7 @@ SIZES = {
 
 @dataclass(frozen=True)
 class Estimates:
-    """What P estimated for an image, in the order of `ACTUAL`; noise on grey values 0 to 1."""
+    """P's estimates for an image, in the order of `ACTUAL`; noise on grey values 0 to 1."""
 
     image: str
     noise_variance: float

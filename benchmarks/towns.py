@@ -1,4 +1,4 @@
-"""Dense cities with a surface model: of the ground that both images show, or as reference."""
+"""Dense cities with a surface model: of the ground visible in both images, or as the reference."""
 
 from __future__ import annotations
 
@@ -48,27 +48,27 @@ REFERENCES = {TO_MODEL: (0.0, 0.0), STEEPER: (0.0, 5.0), TO_OTHER: (0.0, 0.0)} |
     TO_OPPOSITE: (180.0, 0.0),
 }
 _REFUSED = (OTHER, TO_OTHER, TO_ROTATED, TO_OPPOSITE)
-# By how much the azimuths of the radar, of the camera and of its sun are stated wrong, in degrees.
+# Errors of the stated azimuths of the radar, and of the camera and its sun, in degrees.
 _ROTATIONS_DEG = {ROTATED: (90.0, 0.0), OPPOSITE: (180.0, 180.0)}
 WANTED_SHARE = 0.9
 LARGEST_PX = 3.0
 
-# Pixels, noise and displacement (east, north) of a model as stereo images of a satellite give it;
-# where it is the reference, there is none, but a share of the objects are missing.
+# Pixel size, noise and displacement (east, north) of a model from satellite stereo images. A
+# model that is the reference is not displaced, but lacks a share of the objects.
 _ROUGH_M, _NOISE_M, _MOVED_M = 2.0, 0.5, (3.0, -2.0)
 _MISSING_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class TownCase:
-    """A city, with one of the surface models of `SETTINGS`."""
+    """A city with one of the surface models of `SETTINGS`."""
 
     seed: int
     setting: str
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair, parameters = city(self.seed).pair(self.cache), {}
         if self.setting != NONE:
             other = city(self.seed + 1) if self.setting == OTHER else city(self.seed)
@@ -84,14 +84,14 @@ class TownCase:
 
 @dataclass(frozen=True)
 class ReferenceCase:
-    """A radar image of a city, registered to a surface model by one of `REFERENCES`."""
+    """A radar image of a city, registered to a surface model in one of the ways of `REFERENCES`."""
 
     seed: int
     setting: str
     cache: Path
 
     def run(self, workers: int | None) -> Outcome:
-        """Make the pair if need be, register it and judge the result."""
+        """Make the pair if needed, register it and judge the result."""
         pair = seen_by_radar(self.seed).pair(self.cache)
         of = pair if self.setting != TO_OTHER else seen_by_radar(self.seed + 1).pair(self.cache)
         model = rough(of.reference.parent / files.NAMES["dsm"], is_reference=True)
@@ -111,7 +111,7 @@ def seen_by_radar(seed: int) -> Simulation:
 
 
 def to_model(pair: Pair, model: Path) -> Pair:
-    """Return a pair with a model as the reference, and the truth in its pixels."""
+    """Return a pair with a model as the reference, and the truth in the model's pixels."""
     with open_raster(pair.reference) as image, open_raster(model) as heights:
         larger = heights.grid.pixel_size_m / image.grid.pixel_size_m
 
@@ -127,7 +127,7 @@ def to_model(pair: Pair, model: Path) -> Pair:
 def rotated_views(
     reference: Path, input: Path, radar_deg: float, camera_deg: float
 ) -> dict[str, str]:
-    """Return the views of the images beside their files, with azimuths that are wrong."""
+    """Return the views from the files beside the images, with wrong azimuths."""
     radar = _words(View.of(reference, None), radar_deg)
     return {"views": f"{radar}; {_words(View.of(input, None), camera_deg)}"}
 
@@ -144,9 +144,9 @@ def _words(view: View | None, rotation_deg: float) -> str:
 
 
 def rough(model: Path, is_reference: bool = False) -> Path:
-    """Return a surface model with larger pixels and noise, made beside the fine one.
+    """Return a surface model with larger pixels and noise, written beside the fine one.
 
-    It is displaced; or, if it is to be the reference, a share of the objects are missing.
+    It is displaced, or, as a reference, lacks a share of the objects.
     """
     path = model.with_name("rough_reference.tif" if is_reference else "rough.tif")
     if path.exists():
@@ -163,7 +163,7 @@ def rough(model: Path, is_reference: bool = False) -> Path:
             moved = compose(Affine.translation(*_MOVED_M), moved)
         scale = Affine.scale(fine.width / shape[1], fine.height / shape[0])
         transform, crs = compose(moved, scale), fine.crs
-    # Whole or not at all, also where two processes make it.
+    # Complete or not at all, even if two processes make it.
     made = path.with_name(f"{path.stem}-{np.random.default_rng().integers(2**31)}.tif")
     write_image((heights + np.float32(_NOISE_M) * noise)[None], transform, made, crs)
     made.rename(path)
@@ -171,7 +171,7 @@ def rough(model: Path, is_reference: bool = False) -> Path:
 
 
 def without_some(surface_m: FloatImage, pixel_m: float) -> FloatImage:
-    """Return heights without a share of the objects, drawn at random: built since."""
+    """Return heights without a random share of the objects, as if these were built since."""
     ground = bare_ground(surface_m, np.ones(surface_m.shape, bool), pixel_m)
     stands = (surface_m - ground > LOWEST_M).astype(np.uint8)
     count, labels = cv2.connectedComponents(stands, connectivity=4)
@@ -183,7 +183,7 @@ def without_some(surface_m: FloatImage, pixel_m: float) -> FloatImage:
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
     seeds = settings.seed_numbers()
-    # Seed by seed, so that processes do not make the same pair at the same time.
+    # Seed by seed, so that no two processes make the same pair at the same time.
     for seed in (*seeds, seeds[-1] + 1):
         city(seed).pair(settings.cache)
         seen_by_radar(seed).pair(settings.cache)
@@ -208,7 +208,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def goals(name: str, outcomes: Sequence[Outcome]) -> tuple[Goal, ...]:
-    """Return the goals of one setting and what was found."""
+    """Return the goals of one setting, with their results."""
     taken = len(accepted(outcomes))
     found = [none_wrong(f"{name}: silently wrong", outcomes)]
     if name in _REFUSED:

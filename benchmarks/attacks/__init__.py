@@ -1,4 +1,4 @@
-"""The red team: what deceives a registration, and how often it is silently wrong."""
+"""The red team: attacks that provoke silently wrong registrations, and how often they succeed."""
 
 from .suite import run
 

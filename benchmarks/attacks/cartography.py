@@ -1,4 +1,4 @@
-"""More that is locked to pixels: what maps, viewers and prints put over images."""
+"""More pixel-locked content: overlays of maps, viewers and prints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .overlays import Canvas, Overlay, overlay, smooth_noise
 
 @overlay("building outlines")
 def buildings(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Draw the outlines or areas of houses along streets, as a town's map has them."""
+    """Draw the outlines of houses along streets, as on a town map."""
     canvas = Canvas(shape)
     turn, step = rng.uniform(0, np.pi / 2), rng.uniform(18, 34)
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
@@ -31,7 +31,7 @@ def buildings(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("tracks and pins")
 def tracks(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Draw a few tracks of a receiver, thick, and pins."""
+    """Draw a few thick tracks of a GNSS receiver, and pins."""
     canvas = Canvas(shape)
     for _ in range(int(rng.integers(2, 6))):
         steps = smooth_noise((200, 1), 12, rng)[:, 0] * 0.25
@@ -47,7 +47,7 @@ def tracks(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("viewer's window")
 def window(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Put the panels, buttons and text of a viewer around and over the image."""
+    """Put a viewer's panels, buttons and text around and over the image."""
     canvas = Canvas(shape)
     rows, columns = shape
     side = int(rng.uniform(0.12, 0.3) * columns)
@@ -65,7 +65,7 @@ def window(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("lines of text")
 def text(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Write many lines over a part of the image."""
+    """Write many lines of text over a part of the image."""
     canvas = Canvas(shape)
     first, grey = int(rng.uniform(0.0, 0.4) * shape[0]), int(rng.choice([0, 255]))
     for line in range(first + 14, first + int(0.55 * shape[0]), int(rng.integers(15, 26))):
@@ -76,7 +76,7 @@ def text(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("heat map")
 def heat_map(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Tint the image by blobs with steps, as a layer of statistics does."""
+    """Tint the image with stepped blobs, as a heat map does."""
     heat = smooth_noise(shape, float(rng.uniform(12, 35)), rng)
     steps = np.floor(heat * rng.uniform(1, 3))
     alpha = np.where(steps > 0, rng.uniform(0.25, 0.6), 0.0)
@@ -85,7 +85,7 @@ def heat_map(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("shaded relief")
 def shaded_relief(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Lay the shading of a rugged terrain over the image, as layers of a web map are."""
+    """Lay the shaded relief of rugged terrain over the image, as in web maps."""
     heights = sum(size * smooth_noise(shape, size, rng) for size in (3.0, 6.0, 12.0, 24.0))
     down, right = np.gradient(np.asarray(heights) * rng.uniform(0.5, 1.0))
     azimuth, height = np.deg2rad([rng.uniform(0, 360), 45.0])
@@ -97,7 +97,7 @@ def shaded_relief(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("areas of a map")
 def areas(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Tint the image by areas of one value each, as a map of statistics does."""
+    """Tint areas with one value each, as a choropleth map does."""
     count = int(shape[0] * shape[1] / rng.uniform(30, 70) ** 2) + 4
     towns = rng.uniform(0, 1, (count, 2)) * shape
     pixels = np.stack(np.indices(shape), axis=-1).reshape(-1, 2)
@@ -109,7 +109,7 @@ def areas(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("screen of a print")
 def halftone(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Print the image by a screen of dots."""
+    """Print the image with a halftone screen."""
     rows, columns = np.indices(shape)
     period, turn = rng.uniform(3.5, 9), rng.uniform(0, np.pi / 2)
     along = rows * np.cos(turn) + columns * np.sin(turn)
@@ -120,7 +120,7 @@ def halftone(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("gaps between tiles")
 def tile_gaps(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Leave thin lines between the tiles of a web map, and tiles that were not loaded."""
+    """Leave thin lines between the tiles of a web map, and blank unloaded tiles."""
     canvas = Canvas(shape)
     side, grey = int(rng.choice([64, 64, 128])), int(rng.choice([1, 200, 255]))
     origin = rng.integers(0, side, 2)
@@ -137,7 +137,7 @@ def tile_gaps(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @effect("tiles of lower resolution")
 def coarse_tiles(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Blur the same tiles, of which finer ones were not loaded."""
+    """Blur the same tiles in both images, as if their finer level had not been loaded."""
     side, size = int(rng.choice([32, 64])), float(rng.uniform(2, 6))
     late = rng.random((40, 40)) < rng.uniform(0.3, 0.6)
     tile = late[np.ix_(*(np.arange(n) // side for n in shape))]
@@ -150,7 +150,7 @@ def coarse_tiles(shape: Shape, rng: np.random.Generator) -> Effect:
 
 @effect("interlaced rows")
 def interlaced(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Darken every other row, or few, of another exposure in each block of rows."""
+    """Darken every second to fourth row, by another gain in each block of rows."""
     period = int(rng.integers(2, 5))
     rows = (np.arange(shape[0]) % period == 0)[:, None]
     gain = np.repeat(rng.uniform(0.3, 0.8, shape[0] // 20 + 1), 20)[: shape[0], None]

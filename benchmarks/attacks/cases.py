@@ -37,22 +37,22 @@ _CAMERA = "camera"
 _CAMERAS = ("match_optical", *_ANY)
 
 POSES = "estimate_rotation"
-# Widths of the images that the limits of `rotated_pairs` are for.
+# Image width for which the limits of `rotated_pairs` hold.
 _POSE_SIDE_PX = 256
 _POSE_LIMITS = {kind.removesuffix("-rotated"): limit for kind, limit in LARGEST_ERROR_PX.items()}
 _OTHER_POSE_LIMIT = min(_POSE_LIMITS.values())
 
-# Errors in columns and rows of a root mean square σ lie within this times σ in 90 of 100.
+# 90 of 100 errors in the plane lie within this factor times their root mean square σ.
 _CE90_PER_RMS = math.sqrt(math.log(10))
 
-# Controls with overlays.
+# Controls with overlays, of which each seed takes half.
 _HALVED = ("overlay on aligned ground",)
 
-# How often a tool is told how far to search, though the attack does not need it, and how far.
+# Share of attacks that get a search radius without needing one, and the range of the radius.
 _WITH_RADIUS = 0.4
 _RADII_PX = (26.0, 45.0)
 
-# A tool without a radius looks where it likes.
+# Tools without a search radius.
 _WITHOUT_RADIUS = ("register",)
 
 
@@ -63,7 +63,7 @@ def tools_of(kind: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class AttackCase:
-    """An attack on a scene, and the tool that is to be deceived."""
+    """An attack on a scene, and the tool under attack."""
 
     attack: str
     variant: str
@@ -75,12 +75,12 @@ class AttackCase:
 
     @property
     def group(self) -> str:
-        """Of which kind the attack is."""
+        """Group of the attack."""
         return find(self.attack, self.variant).group
 
     @property
     def name(self) -> str:
-        """What repeats it alone."""
+        """Name by which this case can be repeated."""
         return "/".join((self.attack, self.variant or "-", self.scene, self.tool, str(self.seed)))
 
     def make(self) -> Pair:
@@ -103,7 +103,7 @@ class AttackCase:
         return made
 
     def run(self, workers: int | None) -> AttackOutcome:
-        """Make the pair, let the tool try, and judge what it says."""
+        """Make the pair, call the tool, and judge its result."""
         pair = self.make()
         arguments = {} if self.tool in _WITHOUT_RADIUS else pair.arguments()
 
@@ -123,12 +123,12 @@ class AttackCase:
         )
 
     def save(self, folder: Path) -> None:
-        """Write the pair into a folder, to be looked at."""
+        """Write the pair into a folder for inspection."""
         self.make().save(folder)
 
 
 def judge(tool: str, pair: Pair, error_px: float) -> str:
-    """Return what an accepted result is; a pose is a start, and right or wrong."""
+    """Return the verdict on an accepted result; a pose is only a start, so it is right or wrong."""
     believed = pair.sigma_px * _CE90_PER_RMS
     if tool != POSES:
         return classify(True, error_px, believed)
@@ -138,7 +138,7 @@ def judge(tool: str, pair: Pair, error_px: float) -> str:
 
 @lru_cache
 def all_scenes(data: Path) -> dict[str, Scene]:
-    """Return all scenes by name, the examples, too."""
+    """Return all scenes by name, including the examples."""
     return {scene.name: scene for scene in (*scenes(data), *examples.scenes(data))}
 
 
@@ -148,12 +148,12 @@ def find(attack: str, variant: str) -> Attack:
 
 
 def named(name: str, data: Path, cache: Path) -> AttackCase | SensorCase:
-    """Return the case of a name.
+    """Return the case with a name.
 
     Raises
     ------
     ValueError
-        There is none.
+        The name does not have the form of a case's name.
     """
     words = name.split("/")
     if len(words) != 5 or not words[-1].isdigit():
@@ -168,15 +168,15 @@ def named(name: str, data: Path, cache: Path) -> AttackCase | SensorCase:
 def cases(
     seeds: Sequence[int], data: Path, cache: Path, large: bool = False
 ) -> list[AttackCase | SensorCase]:
-    """Return the cases: each seed draws scenes for each attack, which is tried on all tools.
+    """Return the cases: each seed draws scenes for each attack and tries them on all tools.
 
-    Images with RPCs have one size: of large scenes there are none.
+    Images with RPCs have one size, so `large` leaves them out.
     """
     made: list[AttackCase | SensorCase] = [] if large else list(sensor_cases(seeds, cache))
     every = all_scenes(data)
     for seed in seeds:
         for number, attack in enumerate(ATTACKS):
-            # Overlays are many: each seed has every other.
+            # There are many overlays: each seed takes every other one.
             is_overlay = attack.group == LOCKED or attack.name in _HALVED
             if (is_overlay and (number + seed) % 2) or (attack.is_example and seed != seeds[0]):
                 continue
@@ -200,12 +200,12 @@ def cases(
 
 
 def draw_scene(fitting: Sequence[Scene], rng: np.random.Generator) -> Scene:
-    """Return a scene: each kind of pair, and simulated ones, as likely."""
+    """Draw a scene: first the kind of pair, real or simulated, then the scene."""
     groups: dict[str, list[Scene]] = {}
     for scene in fitting:
         kind = scene.kind if scene.kind in TOOLS else _CAMERA
         groups.setdefault(f"{kind} {scene.case is None}", []).append(scene)
-    # Most real pairs are of cameras.
+    # Most real pairs are of cameras: their groups count twice.
     names = sorted(groups) + [name for name in groups if name.startswith(_CAMERA)]
     group = groups[names[int(rng.integers(len(names)))]]
     return group[int(rng.integers(len(group)))]

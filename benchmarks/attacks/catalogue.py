@@ -1,4 +1,4 @@
-"""The list of attacks: each makes, of a pair whose ground lies right, one that deceives."""
+"""The list of attacks: each turns a correctly georeferenced pair into one that deceives."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .scenes import Scene, elsewhere
 
 @dataclass(frozen=True)
 class Setting:
-    """What an attack may draw from.
+    """Random numbers and other scenes that an attack may draw from.
 
     Parameters
     ----------
     rng
-        Random numbers of this case alone.
+        Random numbers for this case alone.
     scenes, seed, cache
-        Other places, and which of each.
+        Scenes of other places; the seed and the folder by which they are made.
     """
 
     rng: np.random.Generator
@@ -30,7 +30,7 @@ class Setting:
     cache: Path
 
     def elsewhere(self, pair: Pair) -> Pair:
-        """Return a pair with an input of another place."""
+        """Return the pair with an input that shows another place."""
         return elsewhere(pair, self.scenes, self.rng, self.seed, self.cache)
 
 
@@ -44,11 +44,11 @@ class Attack:
     Parameters
     ----------
     group, name, variant
-        Of which kind it is; what it is called in tables; what differs between attacks of one name.
+        Its kind; its name in tables; what distinguishes attacks of one name.
     make
-        Makes the pair.
+        Returns the attacked pair.
     fits
-        Which scenes it can be made of.
+        Whether a scene is suitable.
     """
 
     group: str
@@ -59,12 +59,12 @@ class Attack:
 
     @property
     def is_control(self) -> bool:
-        """Whether it ought to be registered."""
+        """Whether the pair should be registered."""
         return self.group == CONTROLS
 
     @property
     def is_example(self) -> bool:
-        """Whether it stands for one pair of files alone."""
+        """Whether it stands for a single pair of files."""
         return self.group == EXAMPLES
 
 
@@ -80,18 +80,18 @@ EXAMPLES = "examples"
 SENSOR = "images with RPCs"
 
 
-# How many scenes a seed draws for each attack of a group, if not one.
+# Number of scenes that a seed draws for each attack of a group; 1 for other groups.
 DRAWS = {PARTS: 2, NOISE: 3, CITIES: 3, REPETITION: 3, GROUND: 2, PLACEMENT: 2}
 
 
 def direction(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
-    """Return a shift (right, down) of a length between two limits, in any direction."""
+    """Return a shift (right, down) in a random direction, its length between two limits."""
     angle, length = rng.uniform(0, 2 * np.pi), rng.uniform(low, high)
     return length * np.array([np.cos(angle), np.sin(angle)])
 
 
 def resampled(make: Make) -> Make:
-    """Make the same, and put the input onto another grid, which its georeferencing states."""
+    """Return an attack that also resamples the input to another grid and states it correctly."""
 
     def made(pair: Pair, setting: Setting) -> Pair:
         other = make(pair, setting)
@@ -102,5 +102,5 @@ def resampled(make: Make) -> Make:
 
 
 def as_text(shift_px: np.ndarray) -> str:
-    """Return a shift for people."""
+    """Return a shift as text."""
     return f"ground at ({shift_px[0]:+.1f}, {shift_px[1]:+.1f}) px"

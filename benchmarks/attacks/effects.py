@@ -1,4 +1,4 @@
-"""More that is locked to pixels: gaps, lattices of compression and display, what sensors add."""
+"""More pixel-locked content: gaps, lattices of compression and display, sensor artefacts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .pairs import NODATA, Change
 
 @dataclass(frozen=True)
 class Effect:
-    """A change that depends on what an image shows, on a lattice of the array."""
+    """A change that depends on the image content, on a lattice of the array."""
 
     function: Change
 
@@ -25,14 +25,14 @@ class Effect:
         return self.function
 
 
-# What cannot be moved within an image.
+# Effects that cannot be moved within an image.
 OF_THE_ARRAY: list[str] = []
 
 Shape = tuple[int, int]
 
 
 def effect(name: str) -> Callable[[Callable[[Shape, np.random.Generator], Effect]], object]:
-    """Put an effect in the list."""
+    """Register an effect by its name."""
 
     def listed(draw: Callable[[Shape, np.random.Generator], Effect]) -> object:
         OVERLAYS[name] = draw  # type: ignore[assignment]
@@ -43,12 +43,12 @@ def effect(name: str) -> Callable[[Callable[[Shape, np.random.Generator], Effect
 
 
 def each_band(change: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Effect:
-    """Return the effect of a change of single bands."""
+    """Return the effect that changes each band by itself."""
     return Effect(lambda image: np.maximum(np.stack([change(band) for band in image]), 1))
 
 
 def compressed(quality: int) -> Effect:
-    """Return the effect of JPEG at a quality."""
+    """Return the effect of JPEG compression at a quality."""
 
     def compress(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
         _, code = cv2.imencode(".jpg", band, [cv2.IMWRITE_JPEG_QUALITY, quality])
@@ -59,13 +59,13 @@ def compressed(quality: int) -> Effect:
 
 @effect("JPEG blocks")
 def jpeg(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Compress strongly, on the same lattice of 8 by 8 pixels."""
+    """Compress strongly, on the same lattice of 8 by 8 pixels in both images."""
     return compressed(int(rng.integers(3, 18)))
 
 
 @effect("nearest-neighbour upsampling")
 def upsampled(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Take coarse pixels and make them finer by repeating them."""
+    """Enlarge coarse pixels by repeating them."""
     factor = float(rng.uniform(1.6, 6.0))
     coarse = tuple(round(side / factor) for side in shape[::-1])
 
@@ -92,7 +92,7 @@ def interpolated(shape: Shape, rng: np.random.Generator) -> Effect:
 
 @effect("local contrast by tiles")
 def local_contrast(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Stretch each tile by itself, as viewers do."""
+    """Stretch the contrast of each tile by itself, as viewers do."""
     tiles = tuple(int(n) for n in rng.integers(2, 9, 2))
 
     def stretch(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -110,7 +110,7 @@ def local_contrast(shape: Shape, rng: np.random.Generator) -> Effect:
 
 @effect("posterised")
 def posterised(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Keep a few grey levels, of the same histogram."""
+    """Keep a few grey levels that are equally frequent."""
     levels = int(rng.integers(2, 6))
 
     def reduce(band: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -126,7 +126,7 @@ def _gaps(holes: NDArray[np.bool_], value: int) -> Effect:
 
 @effect("nodata frame or wedge")
 def nodata_wedge(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Cut the same wedges or frames out of both images, declared as nodata or merely black."""
+    """Cut the same wedges or frames out of both images, as nodata, black or white."""
     rows, columns = np.indices(shape)
     holes = np.zeros(shape, bool)
     for _ in range(int(rng.integers(1, 5))):
@@ -140,7 +140,7 @@ def nodata_wedge(shape: Shape, rng: np.random.Generator) -> Effect:
 
 @effect("irregular nodata")
 def irregular_nodata(shape: Shape, rng: np.random.Generator) -> Effect:
-    """Cut the same holes, as of a cloud mask, out of both images."""
+    """Cut the same irregular holes out of both images, like those of a cloud mask."""
     noise = smooth_noise(shape, float(rng.uniform(5, 25)), rng)
     holes = noise > np.quantile(noise, rng.uniform(0.5, 0.85))
     return _gaps(holes, int(rng.choice([NODATA, NODATA, 1, 255])))
@@ -167,7 +167,7 @@ def vignetting(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("stripes")
 def stripes(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Add stripes of detectors, regular or not."""
+    """Add detector stripes, regular or irregular, along columns or rows."""
     period = float(rng.uniform(3, 20))
     at = np.arange(shape[1])
     regular = np.sign(np.sin(2 * np.pi * at / period))
@@ -181,7 +181,7 @@ def stripes(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("compass, scale bar and legend")
 def furniture(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Add a map's furniture."""
+    """Add a compass, a scale bar and a legend."""
     canvas = Canvas(shape)
     rows, columns = shape
     at = np.array([columns - 45, 45])
@@ -213,7 +213,7 @@ def dust(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("snow of one shape")
 def snow_cover(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Cover a part by white of one shape with a sharp edge."""
+    """Cover a part with snow of one shape with sharp edges."""
     noise = smooth_noise(shape, float(rng.uniform(8, 30)), rng) + 0.4 * smooth_noise(shape, 3, rng)
     cover = noise > np.quantile(noise, 1 - rng.uniform(0.3, 0.6))
     return Overlay(230 + 8 * rng.normal(size=shape), cover * rng.uniform(0.7, 1.0))
@@ -221,7 +221,7 @@ def snow_cover(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("parcel boundaries")
 def parcels(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Draw a cadastre: irregular polygons over all of the image."""
+    """Draw a cadastre: irregular polygons over the whole image."""
     seeds = rng.uniform(0, shape, (int(rng.integers(40, 200)), 2))
     _, nearest = cKDTree(seeds).query(np.moveaxis(np.indices(shape), 0, -1))
     cell = nearest.astype(np.float32)
@@ -231,7 +231,7 @@ def parcels(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("contour lines")
 def contours(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Draw the contours of hills that are not those of the scene."""
+    """Draw contour lines of hills that do not belong to the scene."""
     hills = 6 * smooth_noise(shape, float(rng.uniform(20, 50)), rng)
     steps = np.floor(hills).astype(np.float32)
     edge = cv2.dilate(steps, np.ones((2, 2))) != steps
@@ -240,7 +240,7 @@ def contours(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("crosses and dots")
 def crosses(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Draw the crosses of a réseau plate, or measured points."""
+    """Draw the crosses of a réseau plate, or scattered measured points."""
     canvas = Canvas(shape)
     regular, step = rng.random() < 0.5, int(rng.integers(35, 80))
     lattice = np.stack(np.meshgrid(*(np.arange(step // 2, s, step) for s in shape[::-1])), -1)
@@ -256,7 +256,7 @@ def crosses(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("dead columns and pixels")
 def dead_pixels(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Put single columns, pixels and clusters of them to the largest or least value."""
+    """Set single columns, pixels and clusters of pixels to the largest or least value."""
     alpha = (rng.random(shape) < rng.uniform(0.002, 0.03)).astype(float)
     alpha = np.maximum(
         alpha, cv2.dilate((rng.random(shape) < 0.0005).astype(float), np.ones((4, 4)))
@@ -267,7 +267,7 @@ def dead_pixels(shape: Shape, rng: np.random.Generator) -> Overlay:
 
 @overlay("hatched areas")
 def hatched(shape: Shape, rng: np.random.Generator) -> Overlay:
-    """Hatch or tint polygons, as of planning maps."""
+    """Hatch or tint polygons, as planning maps do."""
     rows, columns = np.indices(shape)
     areas = smooth_noise(shape, float(rng.uniform(18, 45)), rng) > 0.3
     period = float(rng.uniform(5, 14))

@@ -1,4 +1,4 @@
-"""Pairs that were once accepted and should not have been, beside the real pairs."""
+"""Pairs among the real ones that were once accepted and should not have been."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .scenes import Scene, to_grey
 
 FOLDER = "attacks"
 
-# Which kinds of images they show, and where the ground truly lies (right, down), in pixels; None:
-# another place, or parts that moved differently, of which nothing may be accepted.
+# The kind of the pair, and the true displacement of the ground (right, down) in pixels. None:
+# another place, or parts that moved differently, so that no transform may be accepted.
 _OPTICAL = "optical-optical"
 _KNOWN: dict[str, tuple[str, tuple[float, float] | None]] = {
     "caption-strip-different-places-1": (SAR_OPTICAL, None),
@@ -28,12 +28,12 @@ _KNOWN: dict[str, tuple[str, tuple[float, float] | None]] = {
 
 @dataclass(frozen=True)
 class Example(Scene):
-    """Two files that deceive as they are."""
+    """Two files that are an attack without any change."""
 
     folder: Path = Path()
 
     def pair(self, seed: int, cache: Path) -> Pair:
-        """Return the pair of the files."""
+        """Return the pair that the files hold."""
         images = (to_grey(read_image(self.folder / f"{name}.tif")) for name in "ri")
         reference, image = images
         shift = _KNOWN[self.name][1]
@@ -44,7 +44,7 @@ class Example(Scene):
 
 
 def scenes(data: Path) -> list[Scene]:
-    """Return the examples of the folder of real pairs."""
+    """Return the examples in the folder of real pairs."""
     return [
         Example(name, kind, folder=data / FOLDER / name)
         for name, (kind, _) in _KNOWN.items()
@@ -53,12 +53,12 @@ def scenes(data: Path) -> list[Scene]:
 
 
 def is_example(scene: Scene) -> bool:
-    """Whether a scene is one of them."""
+    """Whether a scene is an example."""
     return isinstance(scene, Example)
 
 
 def as_it_is(pair: Pair, setting: Setting) -> Pair:
-    """Return the pair."""
+    """Return the pair unchanged."""
     return pair
 
 

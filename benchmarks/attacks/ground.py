@@ -1,4 +1,4 @@
-"""Attacks by ground that changed between the images, which lies elsewhere."""
+"""Attacks by ground that changed between the images and is displaced in the input."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _area(shape: Shape, rng: np.random.Generator, low: float, high: float) -> ND
 
 
 def rebuilt(shape: Shape, rng: np.random.Generator) -> Change:
-    """Replace 20 to 40 % by blocks of elsewhere in the image."""
+    """Replace 20 to 40 % of the image by blocks from elsewhere in it."""
     share, side = rng.uniform(0.2, 0.4), int(rng.integers(20, 60))
 
     def build(image: Image) -> Image:
@@ -45,30 +45,30 @@ def rebuilt(shape: Shape, rng: np.random.Generator) -> Change:
 
 
 def flooded(shape: Shape, rng: np.random.Generator) -> Change:
-    """Put 30 to 70 % under water."""
+    """Flood 30 to 70 % of the image."""
     water = _area(shape, rng, 0.3, 0.7)
     return lambda image: np.where(water, to_bytes(25 + 6 * rng.normal(size=shape)), image)
 
 
 def burnt(shape: Shape, rng: np.random.Generator) -> Change:
-    """Darken what burnt, and its texture."""
+    """Darken burnt areas and weaken their texture."""
     area = _area(shape, rng, 0.3, 0.6)
     return lambda image: np.where(area, to_bytes(30 + 0.2 * image), image)
 
 
 def snow(shape: Shape, rng: np.random.Generator) -> Change:
-    """Cover most by snow."""
+    """Cover 30 to 60 % of the image with snow."""
     return snow_cover(shape, rng).change()
 
 
 def seasons(shape: Shape, rng: np.random.Generator) -> Change:
-    """Invert the contrast of fields."""
+    """Invert the contrast of some areas, as crops do."""
     area = _area(shape, rng, 0.3, 0.7)
     return lambda image: np.where(area, to_bytes(256.0 - image), image)
 
 
 def night(shape: Shape, rng: np.random.Generator) -> Change:
-    """Leave lights only, with noise."""
+    """Leave only lights, with noise."""
     share, noise = rng.uniform(0.97, 0.995), rng.uniform(2, 10)
 
     def darken(image: Image) -> Image:
@@ -80,7 +80,7 @@ def night(shape: Shape, rng: np.random.Generator) -> Change:
 
 
 def glint(shape: Shape, rng: np.random.Generator) -> Change:
-    """Blind a part by the sun, with fine sparkle."""
+    """Add sun glint with fine sparkle to a part of the image."""
     rows, columns = np.indices(shape)
     centre = rng.uniform(0.2, 0.8, 2) * shape
     reach = rng.uniform(0.2, 0.45) * max(shape)
@@ -90,7 +90,7 @@ def glint(shape: Shape, rng: np.random.Generator) -> Change:
 
 
 def clouds(shape: Shape, rng: np.random.Generator) -> Change:
-    """Cover a part by clouds with shadows."""
+    """Cover a part of the image with clouds and their shadows."""
     return cloud_deck(shape, rng).change()
 
 
@@ -106,7 +106,7 @@ _INPUT_ONLY: dict[str, Draw] = {
 
 
 def changed(draw: Draw) -> Make:
-    """The input's ground changed, and lies off."""
+    """Return an attack that changes the input's ground and displaces it."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, 0.0, 20.0)
@@ -117,7 +117,7 @@ def changed(draw: Draw) -> Make:
 
 
 def moving_clouds(pair: Pair, setting: Setting) -> Pair:
-    """The same clouds, moved by the wind, over ground that lies elsewhere."""
+    """Put the same clouds, moved by the wind, over ground that is displaced by another shift."""
     rng = setting.rng
     shift, wind = direction(rng, 0.0, 15.0), np.rint(direction(rng, 5.0, 20.0)).astype(int)
     moved = pair.moved(shift, as_text(shift))
@@ -127,7 +127,7 @@ def moving_clouds(pair: Pair, setting: Setting) -> Pair:
 
 
 def water_moved(pair: Pair, setting: Setting) -> Pair:
-    """A river or shore moved as a whole, by other than the ground lies off."""
+    """Move a river or water area by another shift than the ground."""
     rng, shape = setting.rng, pair.input.shape[1:]
     shift, by = direction(rng, 0.0, 10.0), np.rint(direction(rng, 8.0, 20.0)).astype(int)
     moved = pair.moved(shift, as_text(shift))
@@ -141,7 +141,7 @@ def water_moved(pair: Pair, setting: Setting) -> Pair:
 
 
 def two_dates(pair: Pair, setting: Setting) -> Pair:
-    """Both images are one camera's, of the reference's ground, on two dates; it lies off."""
+    """Replace both images by the reference's ground as one camera sees it on two dates."""
     rng, grey = setting.rng, pair.reference.mean(axis=0, keepdims=True).astype(np.uint8)
     seen = replace(pair, reference=grey, source=Source(grey, grey, np.copy), corner=(0, 0))
     shift = direction(rng, 0.0, 12.0)
@@ -153,7 +153,7 @@ def two_dates(pair: Pair, setting: Setting) -> Pair:
 
 
 def self_copy(pair: Pair, setting: Setting) -> Pair:
-    """One band of the input is the reference itself; the others show ground that lies off."""
+    """Insert the reference as one band of the input; the other bands show displaced ground."""
     rng = setting.rng
     shift = direction(rng, 8.0, 25.0)
     moved = pair.moved(shift, as_text(shift))
@@ -163,7 +163,7 @@ def self_copy(pair: Pair, setting: Setting) -> Pair:
 
 
 def half_transparent_copy(is_resampled: bool) -> Make:
-    """The reference shines through the input, as in a blended export."""
+    """Return an attack that blends the reference into the displaced input."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
@@ -178,7 +178,7 @@ def half_transparent_copy(is_resampled: bool) -> Make:
 
 
 def alpha_band(pair: Pair, setting: Setting) -> Pair:
-    """A band of opacity with the same edges stands beside each image's bands."""
+    """Append the same opacity band to both images; the ground is displaced."""
     rng, shape = setting.rng, pair.input.shape[1:]
     shift = direction(rng, 8.0, 25.0)
     moved = pair.moved(shift, as_text(shift))
@@ -189,12 +189,12 @@ def alpha_band(pair: Pair, setting: Setting) -> Pair:
 
 
 def no_radar_input(scene: Scene) -> bool:
-    """Whether the input is a camera's image."""
+    """Whether the input is a camera image."""
     return scene.kind != SAR_SAR
 
 
 def camera_only(scene: Scene) -> bool:
-    """Whether both are a camera's images."""
+    """Whether both images are camera images."""
     return scene.kind not in (SAR_OPTICAL, SAR_SAR)
 
 

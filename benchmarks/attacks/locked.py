@@ -1,4 +1,4 @@
-"""Attacks by content that is locked to pixels, while the ground lies elsewhere."""
+"""Attacks by pixel-locked content over ground that is displaced."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .pairs import Pair
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
-# How often what is blurred has the opposite contrast in the input.
+# How often blurred content has the opposite contrast in the input.
 _OPPOSITE = 0.3
 
 
@@ -31,7 +31,7 @@ def _elsewhere(pair: Pair, setting: Setting) -> Pair:
 
 
 def displaced(draw: Draw) -> Make:
-    """The ground lies elsewhere in the input, what is locked does not."""
+    """The ground is displaced in the input; the locked content is not."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         moved = _moved(pair, setting)
@@ -51,7 +51,7 @@ def other_place(draw: Draw) -> Make:
 
 
 def placed_right(draw: Draw) -> Make:
-    """The georeferencing is right, so that what is locked lies displaced on the map."""
+    """The georeferencing is correct, so the locked content is displaced on the map."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
@@ -64,7 +64,7 @@ def placed_right(draw: Draw) -> Make:
 
 
 def on_the_map(draw: Draw) -> Make:
-    """What is locked lies at the same place of the map, but not at the same pixels."""
+    """The locked content coincides on the map, but not in array coordinates."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         made = displaced(draw)(pair, setting)
@@ -82,7 +82,7 @@ def on_the_map(draw: Draw) -> Make:
 
 
 def at_an_offset(draw: Draw) -> Make:
-    """What is locked lies elsewhere, too, but not where the ground does."""
+    """The locked content is displaced, too, but by another offset than the ground."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
@@ -99,7 +99,7 @@ def at_an_offset(draw: Draw) -> Make:
 
 
 def of_wrong_scale(draw: Draw) -> Make:
-    """What is locked lies at the same pixels, whose size the input's georeferencing has wrong."""
+    """The locked content coincides in the arrays; the input's geotransform has a wrong scale."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         made = displaced(draw)(pair, setting)
@@ -113,7 +113,7 @@ def of_wrong_scale(draw: Draw) -> Make:
 
 
 def restyled(draw: Draw) -> Make:
-    """What is locked has other colours in the input, and both were compressed."""
+    """The locked content has other colours in the input, and both images are compressed."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng, moved = setting.rng, _moved(pair, setting)
@@ -128,7 +128,7 @@ def restyled(draw: Draw) -> Make:
 
 
 def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
-    """Lines, letters and clouds are a pixel or two wider in the input, whose ground is no match."""
+    """The overlay is a pixel or two wider in the input, whose ground does not match."""
 
     def way(draw: Draw) -> Make:
         def make(pair: Pair, setting: Setting) -> Pair:
@@ -142,7 +142,7 @@ def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
 
 
 def softer(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
-    """What is locked is blurred in both images, and sometimes of opposite contrast in one."""
+    """The locked content is blurred in both images; its contrast may be inverted in the input."""
 
     def way(draw: Draw) -> Make:
         def make(pair: Pair, setting: Setting) -> Pair:
@@ -160,12 +160,12 @@ def softer(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
 
 
 def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
-    """The same, in pixels of another size."""
+    """The same attack with the input resampled to another pixel size."""
     return lambda draw: resampled(way(draw))
 
 
 def aligned(draw: Draw) -> Make:
-    """Ground and what is locked lie right, as in most products."""
+    """Ground and locked content both coincide, as in most products."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         return pair.both(draw(pair.reference.shape[1:], setting.rng).change())
@@ -192,7 +192,7 @@ _WAYS = {
     "softer, resampled": on_another_grid(softer(_moved)),
 }
 
-# What cannot be done to a function of the whole array.
+# Variants that need an overlay: effects are functions of the whole array.
 _OVERLAYS_ONLY = (
     "at an offset",
     "at an offset, resampled",
@@ -206,10 +206,10 @@ _OVERLAYS_ONLY = (
     "softer, resampled",
 )
 
-# Where more is put in the list of overlays.
+# Modules that register further overlays.
 _DRAWN_IN = (effects, cartography)
 
-# What moves with the array only if it is no function of the image: see `effects`.
+# Effects in `effects.OF_THE_ARRAY` cannot be moved within the array.
 ATTACKS = [
     *(
         Attack(LOCKED, name, variant, way(draw))

@@ -1,4 +1,4 @@
-"""Attacks by noise and other loss, with the ground elsewhere."""
+"""Attacks by noise and other loss of detail, over displaced ground."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .effects import Effect, each_band, jpeg
 from .pairs import Change, Image, Pair, to_bytes
 from .scenes import Scene
 
-# Draws a change; it is drawn for each image by itself.
+# Draws a change, separately for each image.
 Draw = Callable[[Image, np.random.Generator], Change]
 
 
@@ -36,13 +36,13 @@ def speckle(image: Image, rng: np.random.Generator) -> Change:
 
 
 def blur(image: Image, rng: np.random.Generator) -> Change:
-    """Take all detail below 8 to 20 px away."""
+    """Remove all detail below 8 to 20 px."""
     size = float(rng.uniform(3, 8))
     return each_band(lambda band: cv2.GaussianBlur(band, (0, 0), size)).change()
 
 
 def haze(image: Image, rng: np.random.Generator) -> Change:
-    """Leave a few grey levels of contrast, with noise."""
+    """Reduce the contrast to a few grey levels, and add noise."""
     contrast, noise = rng.uniform(0.04, 0.15), rng.uniform(1, 6)
     return lambda image: to_bytes(
         170 + contrast * (image - image.mean()) + noise * rng.normal(size=image.shape)
@@ -50,7 +50,7 @@ def haze(image: Image, rng: np.random.Generator) -> Change:
 
 
 def coarse(image: Image, rng: np.random.Generator) -> Change:
-    """Compress strongly, with noise before."""
+    """Add noise, then compress strongly."""
     size = rng.uniform(20, 50)
     block: Effect = jpeg(image.shape[1:], rng)
     return lambda image: block.change()(to_bytes(image + size * rng.normal(size=image.shape)))
@@ -67,7 +67,7 @@ _NOISES: dict[str, Draw] = {
 
 
 def noisy(draw: Draw) -> Make:
-    """Both images have noise of their own; the ground lies 0 to 20 px off."""
+    """Both images have independent noise; the ground is displaced by 0 to 20 px."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, 0.0, 20.0)
@@ -79,18 +79,18 @@ def noisy(draw: Draw) -> Make:
 
 
 def noisy_input(pair: Pair, setting: Setting) -> Pair:
-    """The input alone has noise of 40 to 90 grey levels."""
+    """Only the input has noise of 40 to 90 grey levels."""
     moved = plain(pair, setting)
     return moved.changed(None, gaussian(moved.input, setting.rng))
 
 
 def exchanged(pair: Pair, setting: Setting) -> Pair:
-    """The camera's image is the reference."""
+    """The camera image becomes the reference."""
     return plain(pair, setting).swapped()
 
 
 def built_up(scene: Scene) -> bool:
-    """Whether walls and roofs are what noise leaves."""
+    """Whether walls and roofs remain visible under noise."""
     return scene.density in ("suburban", "urban") or scene.name in (
         "so-rosenheim",
         "so-dense-urban",
@@ -100,23 +100,23 @@ def built_up(scene: Scene) -> bool:
 
 
 def plain(pair: Pair, setting: Setting) -> Pair:
-    """The ground lies off by up to 20 px."""
+    """The ground is displaced by up to 20 px."""
     shift = direction(setting.rng, 0.0, 20.0)
     return pair.moved(shift, as_text(shift))
 
 
 def untouched(pair: Pair, setting: Setting) -> Pair:
-    """Nothing is done: ground and georeferencing agree."""
+    """The pair is unchanged: ground and georeferencing agree."""
     return pair
 
 
 def is_city(scene: Scene) -> bool:
-    """Whether it is a dense city."""
+    """Whether a scene is a dense city."""
     return scene.density == "city" or scene.name == "so-dense-urban"
 
 
 def no_city(scene: Scene) -> bool:
-    """Whether it is none."""
+    """Whether a scene is not a dense city."""
     return not is_city(scene)
 
 

@@ -1,4 +1,4 @@
-"""Content that is locked to pixels: drawn once, the same in every image that it is put on."""
+"""Pixel-locked content: drawn once, and the same in every image that it is put on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..accuracy import FloatArray
 from .pairs import Change, Image, to_bytes
 
-# Draws what is locked, for arrays of (rows, columns).
+# Draws an overlay for arrays of (rows, columns).
 Draw = Callable[[tuple[int, int], np.random.Generator], "Overlay"]
 
 OVERLAYS: dict[str, Draw] = {}
@@ -22,14 +22,14 @@ _CAPTIONS = ("Satellite image 2021-03-04", "Lat 47.123 Lon 12.104", "(c) Agency,
 
 @dataclass(frozen=True)
 class Overlay:
-    """What is put over an image: image · gain · (1 − alpha) + values · alpha + offset.
+    """An overlay on an image: image · gain · (1 − alpha) + values · alpha + offset.
 
     Parameters
     ----------
     values, alpha
-        Grey values and how far they cover, shape (rows, columns).
+        Grey values and their opacity, shape (rows, columns).
     gain, offset
-        Of what is below; scalars or of the same shape.
+        Applied to the image below; scalars or arrays of the same shape.
     """
 
     values: FloatArray
@@ -38,7 +38,7 @@ class Overlay:
     offset: FloatArray | float = 0.0
 
     def change(self, right: int = 0, down: int = 0) -> Change:
-        """Return what puts it over an image, of which it is moved by whole pixels."""
+        """Return the change that puts the overlay on an image, moved by whole pixels."""
 
         def changed(image: Image) -> Image:
             layers = (self.values, self.alpha, self.gain, self.offset)
@@ -50,13 +50,13 @@ class Overlay:
         return changed
 
     def wider(self, px: int) -> Overlay:
-        """Return it with all that covers the image so many pixels wider on every side."""
+        """Return the overlay with all covered areas wider by a number of pixels on every side."""
         side = np.ones((2 * px + 1,) * 2, np.uint8)
         values, alpha = (cv2.dilate(layer, side) for layer in (self.values, self.alpha))
         return replace(self, values=values, alpha=alpha)
 
     def softer(self, px: float) -> Overlay:
-        """Return it blurred by a Gaussian of a standard deviation, as of a coarser sensor."""
+        """Return the overlay blurred by a Gaussian of a standard deviation."""
         alpha, covering = (
             cv2.GaussianBlur(layer, (0, 0), px) for layer in (self.alpha, self.alpha * self.values)
         )
@@ -74,7 +74,7 @@ def _moved(
 
 
 def overlay(name: str) -> Callable[[Draw], Draw]:
-    """Put a drawer in the list."""
+    """Register an overlay by its name."""
 
     def listed(draw: Draw) -> Draw:
         OVERLAYS[name] = draw
@@ -84,7 +84,7 @@ def overlay(name: str) -> Callable[[Draw], Draw]:
 
 
 class Canvas:
-    """Grey values and how far they cover, to be drawn on."""
+    """Grey values and opacity to draw on."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.values = np.zeros(shape, np.uint8)
@@ -97,7 +97,7 @@ class Canvas:
         cv2.polylines(self.alpha, at, False, 255, width, cv2.LINE_8)
 
     def text(self, words: str, at: tuple[int, int], grey: int, scale: float, halo: int) -> None:
-        """Write words, with a halo of a number of pixels."""
+        """Write words, with a halo of a width in pixels."""
         font = cv2.FONT_HERSHEY_SIMPLEX
         for width, value in ((2 + 2 * halo, 255 - grey), (2, grey))[0 if halo else 1 :]:
             cv2.putText(self.values, words, at, font, scale, value, width, cv2.LINE_AA)
@@ -109,7 +109,7 @@ class Canvas:
         cv2.rectangle(self.alpha, first, last, 255, -1)
 
     def overlay(self, opacity: float = 1.0) -> Overlay:
-        """Return what was drawn."""
+        """Return the drawing as an overlay."""
         alpha = self.alpha.astype(float) / 255 * opacity
         values = np.where(self.alpha > 0, self.values * 255.0 / np.maximum(self.alpha, 1), 0)
         return Overlay(np.minimum(values, 255.0), alpha)
@@ -127,7 +127,7 @@ def _points(shape: tuple[int, int], number: int, rng: np.random.Generator) -> np
 
 @overlay("labels and roads")
 def labels_and_roads(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Draw a street map's roads, winding or straight, and names."""
+    """Draw the roads of a street map, winding or straight, with names."""
     canvas = Canvas(shape)
     winding = rng.random() < 0.6
     for _ in range(int(rng.integers(10, 35))):
@@ -155,13 +155,13 @@ def _labelled(canvas: Canvas, number: int, rng: np.random.Generator) -> Overlay:
 
 @overlay("labels")
 def labels(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Write names only."""
+    """Write place names only."""
     return _labelled(Canvas(shape), int(rng.integers(20, 60)), rng)
 
 
 @overlay("watermark")
 def watermark(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Repeat a text, slanted, half transparent."""
+    """Repeat a slanted, half-transparent text."""
     large = int(np.hypot(*shape)) + 20
     canvas = Canvas((large, large))
     across, down = rng.integers(140, 220), rng.integers(45, 110)
@@ -178,7 +178,7 @@ def watermark(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
 
 @overlay("irregular graticule")
 def graticule(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Draw a graticule whose lines are curved and unevenly apart, with figures."""
+    """Draw a graticule of curved, unevenly spaced lines, with figures."""
     canvas = Canvas(shape)
     grey = int(rng.choice([0, 255]))
     bend, width = rng.uniform(-20, 20), int(rng.integers(1, 3))
@@ -198,7 +198,7 @@ def graticule(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
 
 @overlay("caption strip")
 def caption_strip(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Put a caption below, and sometimes a bar of another programme above."""
+    """Put a caption below the image, and sometimes the bar of another program above."""
     canvas = Canvas(shape)
     rows, columns = shape
     height = int(rng.integers(35, 80))
@@ -216,7 +216,7 @@ def caption_strip(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
 
 @overlay("mosaic steps")
 def mosaic_steps(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Make steps of brightness and contrast between irregular tiles."""
+    """Add steps of brightness and contrast between irregular tiles."""
     steps = [np.sort(rng.uniform(0, side, int(rng.integers(3, 9)))) for side in shape]
     tile = [np.searchsorted(step, np.arange(side)) for step, side in zip(steps, shape, strict=True)]
     gains = rng.uniform(0.5, 1.2, (20, 20))[np.ix_(*tile)]
@@ -226,7 +226,7 @@ def mosaic_steps(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
 
 @overlay("cloud deck")
 def cloud_deck(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Cover a part with clouds that are the same in both images, with their shadows."""
+    """Cover a part with clouds and their shadows, the same in both images."""
     noise = smooth_noise(shape, float(rng.uniform(7, 22)), rng)
     noise += 0.35 * smooth_noise(shape, 2.5, rng)
     cover = np.quantile(noise, 1 - rng.uniform(0.25, 0.7))
@@ -237,14 +237,14 @@ def cloud_deck(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
 
 @overlay("soft pattern noise")
 def soft_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Add the same noise, smooth along some pixels, as that of an interpolated sensor is."""
+    """Add the same noise, correlated over some pixels as by interpolation."""
     noise = smooth_noise(shape, float(rng.uniform(1.5, 4.0)), rng)
     return Overlay(np.zeros(shape), np.zeros(shape), 1.0, float(rng.uniform(20, 60)) * noise)
 
 
 @overlay("fixed pattern noise")
 def fixed_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
-    """Add the same noise, of pixels, rows or columns, as an uncalibrated sensor does."""
+    """Add the same noise of pixels, rows or columns, as of an uncalibrated sensor."""
     size = rng.uniform(15, 60)
     kind = int(rng.integers(4))
     noise = rng.normal(size=shape)

@@ -1,4 +1,4 @@
-"""A pair of small images that an attack may change, with what every input pixel truly shows."""
+"""A pair of small images for attacks, with the true reference position of every input pixel."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ Change = Callable[[Image], Image]
 
 NODATA = 0
 
-# What is measured is what lies at or below this share of the errors over the overlap: a
-# registration is silently wrong if more than a tenth of the overlap is.
+# The error of a registration is this percentile of the errors over the overlap: it is silently
+# wrong if more than a tenth of the overlap is.
 ERROR_PERCENTILE = 90.0
 
-# Fewer known positions than these tell nothing.
+# No error is measured from fewer known positions.
 _FEWEST_KNOWN = 20
 
 
 @dataclass(frozen=True)
 class Source:
-    """A whole scene, of which pairs are cut.
+    """A whole scene, from which pairs are cut.
 
     Parameters
     ----------
@@ -51,29 +51,29 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A reference and an input, of which an attack makes another pair.
+    """A reference and an input, which an attack turns into another pair.
 
     Parameters
     ----------
     reference, input
         Bands of bytes, shape (bands, rows, columns); 0 holds no data.
     shown
-        Which reference pixel (col, row) each pixel of the input shows, shape (rows, columns, 2);
-        NaN: none, or it is not known. All are NaN where the images show different places.
+        Reference pixel (col, row) that each input pixel shows, shape (rows, columns, 2). NaN: none,
+        or not known. All are NaN where the images show different places.
     kind
         Kind of the pair, of `cases.KINDS`.
     sigma_px
-        How far the truth can be believed.
+        Uncertainty of the truth.
     source, corner
-        The scene, and which of its reference pixels is the first of this reference.
+        The scene, and its reference pixel at which this reference begins.
     place
-        What is shown.
+        The place that is shown.
     reference_transform, input_transform, reference_crs, input_crs
-        What the georeferencing claims; without a CRS, map units may be anything.
+        The stated georeferencing; without a CRS, the map units are unknown.
     radius_px
-        How far the tool is to search, where it can be asked to; None: as far as it does by itself.
+        Search radius for tools that take one; None: their default.
     note
-        What was drawn, for people.
+        The random choices, as text.
     """
 
     reference: Image
@@ -97,15 +97,15 @@ class Pair:
         return self.input.shape[2], self.input.shape[1]
 
     def moved(self, shift_px: FloatArray, note: str = "") -> Pair:
-        """Return the pair with its ground elsewhere in the input.
+        """Return the pair with the ground displaced in the input.
 
         Parameters
         ----------
         shift_px
-            By how much each input pixel's ground lies right of and below its nominal place:
+            Displacement (right, down) of each input pixel's ground from its nominal place,
             shape (2,) or (rows, columns, 2).
         note
-            What is added to the note.
+            Text to add to the note.
         """
         shown = pixels(self.size) - shift_px
         image, known = render(self.source, shown + np.array(self.corner))
@@ -113,7 +113,7 @@ class Pair:
         return replace(self, input=image, shown=shown, note=join(self.note, note))
 
     def swapped(self) -> Pair:
-        """Return the pair with the images' roles exchanged; each keeps its georeferencing."""
+        """Return the pair with the roles of the images exchanged; each keeps its georeferencing."""
         columns, rows = self.reference.shape[2], self.reference.shape[1]
         shown = np.full((rows, columns, 2), np.nan)
         known = np.isfinite(self.shown).all(axis=-1)
@@ -135,7 +135,7 @@ class Pair:
         )
 
     def changed(self, reference: Change | None, input: Change | None, note: str = "") -> Pair:
-        """Return the pair with changed grey values; what holds no data stays so."""
+        """Return the pair with changed grey values; nodata stays nodata."""
         images = (
             image if change is None else _keep_nodata(image, change(image))
             for image, change in ((self.reference, reference), (self.input, input))
@@ -147,18 +147,18 @@ class Pair:
         )
 
     def both(self, change: Change, note: str = "") -> Pair:
-        """Return the pair with the same change made to both images."""
+        """Return the pair with the same change applied to both images."""
         return self.changed(change, change, note)
 
     def on_another_grid(self, scale: float, corner_px: FloatArray) -> Pair:
-        """Return the pair with its input resampled, so that pixels differ in size and place.
+        """Return the pair with its input resampled to another pixel size and origin.
 
         Parameters
         ----------
         scale
             Pixels of the other grid per pixel of the input.
         corner_px
-            Where the first of them lies, (col, row) of the input, shape (2,).
+            Position of the first of them, (col, row) of the input, shape (2,).
         """
         to_old = compose(Affine.translation(*corner_px), Affine.scale(1 / scale))
         size = tuple(
@@ -184,27 +184,27 @@ class Pair:
         )
 
     def within(self, radius_px: float) -> Pair:
-        """Return the pair with a radius for the tool."""
+        """Return the pair with a search radius for the tool."""
         note = join(self.note, f"radius {radius_px:.1f} px")
         return replace(self, radius_px=radius_px, note=note)
 
     def arguments(self) -> dict[str, float]:
-        """Return the arguments for a tool that can be told how far to search."""
+        """Return the search radius as an argument for tools that take one."""
         if self.radius_px is None:
             return {}
         return {"search_radius": self.radius_px * self.reference_transform.a}
 
     def rasters(self) -> tuple[groundtie.Raster, groundtie.Raster]:
-        """Return both images as the tools take them."""
+        """Return both images as rasters for the tools."""
         return (
             groundtie.Raster(self.reference, self.reference_transform, self.reference_crs, NODATA),
             groundtie.Raster(self.input, self.input_transform, self.input_crs, NODATA),
         )
 
     def known(self) -> tuple[FloatArray, FloatArray]:
-        """Return the reference and input pixels that belong together, on a lattice, shapes (n, 2).
+        """Return corresponding reference and input pixels on a lattice, shapes (n, 2).
 
-        They are those where both images hold data.
+        Both images hold data there.
         """
         at = lattice(self.size)
         near = np.rint(at).astype(int)
@@ -219,7 +219,7 @@ class Pair:
         return shown[inside], at[inside]
 
     def errors_px(self, transform: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
-        """Return what 90 % of the errors do not exceed, and their root mean square.
+        """Return the 90 % quantile of the errors and their root mean square.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Pair:
         Returns
         -------
         tuple
-            In input pixels; infinite where nothing could have been right.
+            In input pixels; infinite where too few positions are known to measure them.
         """
         shown, at = self.known()
         if len(at) < _FEWEST_KNOWN:
@@ -242,7 +242,7 @@ class Pair:
         return float(np.percentile(off, ERROR_PERCENTILE)), float(np.sqrt(np.mean(off**2)))
 
     def save(self, folder: Path) -> None:
-        """Write r.tif and i.tif into a folder, to be looked at."""
+        """Write r.tif and i.tif into a folder for inspection."""
         folder.mkdir(parents=True, exist_ok=True)
         images = (
             ("r.tif", self.reference, self.reference_transform, self.reference_crs),
@@ -258,7 +258,7 @@ def pixels(size: tuple[int, int]) -> FloatArray:
 
 
 def render(source: Source, positions: FloatArray) -> tuple[Image, NDArray[np.bool_]]:
-    """Return the input's bands at reference positions of its scene, and where it has any."""
+    """Return the input's bands at reference positions of its scene, and where they hold data."""
     at = source.to_input(positions.reshape(-1, 2)).reshape(positions.shape).astype(np.float32)
     rows, columns = source.input.shape[1:]
     inside = ((at >= 0) & (at <= np.array([columns - 1, rows - 1]))).all(axis=-1)
@@ -274,12 +274,12 @@ def render(source: Source, positions: FloatArray) -> tuple[Image, NDArray[np.boo
 
 
 def to_bytes(values: FloatArray) -> Image:
-    """Return grey values as bytes that are not nodata."""
+    """Return grey values as bytes, none of them nodata."""
     return np.clip(np.rint(values), 1, 255).astype(np.uint8)
 
 
 def join(*notes: str) -> str:
-    """Return notes as one."""
+    """Join notes into one."""
     return ", ".join(filter(None, notes))
 
 

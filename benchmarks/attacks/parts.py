@@ -1,4 +1,4 @@
-"""Attacks by inputs of which parts moved differently."""
+"""Attacks by images of which parts moved differently."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .overlays import smooth_noise
 from .pairs import Pair, join
 
 _NEAREST_PX, _FARTHEST_PX = 6.0, 20.0
-# All of the input may lie off, too.
+# The whole input may be displaced, too, by up to this.
 _WHOLE_PX = 8.0
 
 Shape = tuple[int, int]
@@ -22,7 +22,7 @@ Part = Callable[[Shape, np.random.Generator], NDArray[np.bool_]]
 
 
 def beyond_line(shape: Shape, share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return the part of an image beyond a straight seam, of a share of its pixels."""
+    """Return a share of an image's pixels that lies beyond a straight seam line."""
     rows, columns = np.indices(shape)
     angle = rng.choice([0, 1, 2, 3]) * np.pi / 2 + rng.uniform(-0.5, 0.5) * rng.integers(0, 2)
     along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
@@ -42,7 +42,7 @@ def quarter(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
 
 
 def corner(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """A corner, a quarter or more of the image."""
+    """A corner, a quarter of the image or more."""
     rows, columns = (np.arange(side) / side for side in shape)
     reach = rng.uniform(0.5, 0.65, 2)
     flips = rng.integers(0, 2, 2)
@@ -62,19 +62,19 @@ def strip(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
 
 
 def blob(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Irregular parts, as a mosaic of two dates has."""
+    """Irregular parts, as in a mosaic of two dates."""
     noise = smooth_noise(shape, float(rng.uniform(25, 60)), rng)
     return np.asarray(noise > np.quantile(noise, 1 - rng.uniform(0.25, 0.5)))
 
 
 def tiles(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Tiles of a web map, some of which are of another date."""
+    """Tiles of a web map, some of them of another date."""
     side = int(rng.choice([64, 128, 256]))
     origin = rng.integers(0, side, 2)
     late = rng.random((20, 20)) < rng.uniform(0.25, 0.5)
     index = [(np.arange(n) + o) // side for n, o in zip(shape, origin, strict=True)]
     part = late[np.ix_(*index)]
-    # At least one tile is, and not all.
+    # Tiles of both dates must remain; otherwise a half moves.
     return part if 0.15 < part.mean() < 0.85 else half(shape, rng)
 
 
@@ -90,7 +90,7 @@ _PARTS: dict[str, Part] = {
 
 
 def seam(part: Part) -> Make:
-    """A part lies off against the rest; the rest is right or lies off as well."""
+    """A part is displaced against the rest; the rest is in place or displaced, too."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
@@ -105,12 +105,12 @@ def seam(part: Part) -> Make:
 
 
 def in_the_reference(make: Make) -> Make:
-    """Make the reference the image of which parts moved."""
+    """Return an attack that moves parts of the reference instead of the input."""
     return lambda pair, setting: make(pair, setting).swapped()
 
 
 def own_strips(pair: Pair, setting: Setting) -> Pair:
-    """Each of several strips lies elsewhere."""
+    """Several strips are displaced, each by its own shift."""
     rng, shape = setting.rng, pair.input.shape[1:]
     number, axis = int(rng.integers(3, 6)), int(rng.integers(2))
     offs = np.stack([direction(rng, 0.0, 16.0) for _ in range(number)])
@@ -120,7 +120,7 @@ def own_strips(pair: Pair, setting: Setting) -> Pair:
 
 
 def half_of_another_place(pair: Pair, setting: Setting) -> Pair:
-    """A half of the input shows another place; the other half lies 5 to 20 px off."""
+    """About half of the input shows another place; the rest is displaced by 5 to 20 px."""
     rng = setting.rng
     shift = direction(rng, 5.0, 20.0)
     moved = pair.moved(shift)
@@ -140,7 +140,7 @@ def _along_rows(shift: FloatArray, shape: Shape) -> FloatArray:
 
 
 def jitter(pair: Pair, setting: Setting) -> Pair:
-    """Rows are moved by the vibrations of a camera, slow or fast."""
+    """Rows are displaced by slow or fast vibrations of the camera."""
     rows = pair.input.shape[1]
     size, period = setting.rng.uniform(5, 12), setting.rng.uniform(60, 1.5 * rows)
     along = size * np.sin(2 * np.pi * np.arange(rows) / period + setting.rng.uniform(0, 6))
@@ -150,14 +150,14 @@ def jitter(pair: Pair, setting: Setting) -> Pair:
 
 
 def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
-    """Some rows stand twice, so that all below lies lower; or are missing."""
+    """Some rows are repeated or missing, which displaces all rows below."""
     rows, rng = pair.input.shape[1], setting.rng
     number = int(rng.integers(7, 20)) * int(rng.choice([-1, 1]))
     at = int(rng.uniform(0.25, 0.75) * rows)
     below = np.arange(rows) >= at
     down = np.where(below, number, 0)
     if number > 0 and rng.random() < 0.5:
-        # One row fills all that was lost.
+        # One row, repeated, fills the gap.
         down = np.clip(np.arange(rows) - at, 0, number)
     shift = np.column_stack([np.zeros(rows), down])
     note = f"{abs(number)} rows {'twice' if number > 0 else 'missing'} at row {at}"
@@ -165,7 +165,7 @@ def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
 
 
 def bulge(pair: Pair, setting: Setting) -> Pair:
-    """A hill that no terrain model took out displaces a part of the image."""
+    """A hill displaces a part of the image, as if no terrain model had been used."""
     rng, shape = setting.rng, pair.input.shape[1:]
     centre, reach = rng.uniform(0.25, 0.75, 2) * shape, rng.uniform(0.15, 0.3) * max(shape)
     rows, columns = np.indices(shape)
@@ -175,7 +175,7 @@ def bulge(pair: Pair, setting: Setting) -> Pair:
 
 
 def waves(pair: Pair, setting: Setting) -> Pair:
-    """The whole input is warped smoothly, as no model of a few parameters can follow."""
+    """The whole input is warped smoothly, beyond any model of a few parameters."""
     rng, shape = setting.rng, pair.input.shape[1:]
     length = float(rng.uniform(30, 70))
     shift = np.stack([smooth_noise(shape, length, rng) for _ in range(2)], axis=-1)

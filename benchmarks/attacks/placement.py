@@ -1,4 +1,4 @@
-"""Attacks by georeferencing that is wrong, by images turned over, and by too little overlap."""
+"""Attacks by wrong georeferencing, by flipped or turned images, and by too little overlap."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .pairs import Pair, join, to_bytes
 
 
 def mirrored(pair: Pair, setting: Setting) -> Pair:
-    """The input is a mirror image, which no registration allows."""
+    """The input is a mirror image, which no transform model allows."""
     axis = int(setting.rng.integers(1, 3))
     shown = np.full_like(pair.shown, np.nan)
     return replace(pair, input=np.flip(pair.input, axis), shown=shown, note=f"axis {axis}")
 
 
 def turned(pair: Pair, setting: Setting) -> Pair:
-    """The input is turned by right angles, but not its georeferencing."""
+    """The input is turned by right angles; its georeferencing is not."""
     turns = int(setting.rng.integers(1, 4))
     image = np.rot90(pair.input, turns, (1, 2))
     shown = np.rot90(pair.shown, turns, (0, 1))
@@ -30,7 +30,7 @@ def turned(pair: Pair, setting: Setting) -> Pair:
 
 
 def south_up(pair: Pair, setting: Setting) -> Pair:
-    """The input's rows run northwards, as its georeferencing states."""
+    """The input's rows run northwards, as its geotransform states."""
     shift = direction(setting.rng, 0.0, 15.0)
     moved = pair.moved(shift, as_text(shift))
     rows = moved.input.shape[1]
@@ -41,7 +41,7 @@ def south_up(pair: Pair, setting: Setting) -> Pair:
 
 
 def tiny_overlap(pair: Pair, setting: Setting) -> Pair:
-    """The images share a strip of 12 to 30 % only, in which the ground lies off."""
+    """The images share a strip of only 12 to 30 %, in which the ground is displaced."""
     rng = setting.rng
     shift, share = direction(rng, 0.0, 20.0), rng.uniform(0.12, 0.3)
     moved = pair.moved(shift, as_text(shift))
@@ -58,7 +58,7 @@ def tiny_overlap(pair: Pair, setting: Setting) -> Pair:
 
 
 def claimed(draw: Callable[[np.random.Generator], tuple[Affine, str]]) -> Make:
-    """The input's georeferencing claims another size or rotation than it has."""
+    """The input's georeferencing states a wrong pixel size or rotation."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, 0.0, 12.0)
@@ -73,30 +73,30 @@ def claimed(draw: Callable[[np.random.Generator], tuple[Affine, str]]) -> Make:
 
 
 def wrong_scale(rng: np.random.Generator) -> tuple[Affine, str]:
-    """Claim pixels that are 2 to 40 % larger or smaller."""
+    """State pixels that are 2 to 40 % too large or too small."""
     scale = float((1 + rng.uniform(0.02, 0.4)) ** rng.choice([-1, 1]))
     return Affine.scale(scale), f"scale {scale:.3f}"
 
 
 def wrong_rotation(rng: np.random.Generator) -> tuple[Affine, str]:
-    """Claim a rotation that is 1 to 30° wrong."""
+    """State a rotation that is wrong by 1 to 30°."""
     angle = float(rng.uniform(1, 30) * rng.choice([-1, 1]))
     return Affine.rotation(angle), f"rotation {angle:.1f}°"
 
 
 def wrong_aspect(rng: np.random.Generator) -> tuple[Affine, str]:
-    """Claim square pixels that are not."""
+    """State pixels that are 3 to 30 % too wide or too narrow."""
     scale = float((1 + rng.uniform(0.03, 0.3)) ** rng.choice([-1, 1]))
     return Affine.scale(scale, 1.0), f"columns {scale:.3f} as wide"
 
 
 def other_zone(pair: Pair, setting: Setting) -> Pair:
-    """The input claims the neighbouring zone with the same coordinates."""
+    """The input states the neighbouring UTM zone with the same coordinates."""
     return replace(pair, input_crs="EPSG:32634")
 
 
 def unknown_units(pair: Pair, setting: Setting) -> Pair:
-    """Neither image states a CRS, and units of both maps are 0.2 to 5 m."""
+    """Neither image states a CRS, and the map units are 0.2 to 5 m."""
     shift, scale = direction(setting.rng, 0.0, 12.0), float(5 ** setting.rng.uniform(-1, 1))
     moved = pair.moved(shift, as_text(shift))
     return replace(
@@ -110,18 +110,18 @@ def unknown_units(pair: Pair, setting: Setting) -> Pair:
 
 
 def far_off(pair: Pair, setting: Setting) -> Pair:
-    """The ground lies 30 to 60 px off, with a radius that is smaller."""
+    """The ground is displaced by 30 to 60 px, beyond the search radius."""
     shift = direction(setting.rng, 30.0, 60.0)
     return pair.moved(shift, as_text(shift)).within(float(setting.rng.uniform(8, 28)))
 
 
 def other_place(pair: Pair, setting: Setting) -> Pair:
-    """The input shows another place, and nothing else is done."""
+    """The input shows another place; nothing else is changed."""
     return setting.elsewhere(pair)
 
 
 def bands_apart(pair: Pair, setting: Setting) -> Pair:
-    """Two of three bands show the ground elsewhere than the first, whose place counts."""
+    """Two of three bands are displaced against the first, whose place counts."""
     rng = setting.rng
     shift, further = direction(rng, 0.0, 12.0), direction(rng, 5.0, 15.0)
     stays, moves = pair.moved(shift, as_text(shift)), pair.moved(shift + further)

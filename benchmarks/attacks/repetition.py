@@ -1,4 +1,4 @@
-"""Attacks by scenes that repeat, where the truth lies beyond the radius of the search."""
+"""Attacks by repetitive scenes whose truth may lie beyond the search radius."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .overlays import smooth_noise
 from .pairs import Image, Pair, join, pixels, render, to_bytes
 from .scenes import SAR_SAR
 
-# Of positions along and across the rows, in periods: how bright it is, from 0 to 1.
+# Takes positions along and across the rows, in periods; returns the brightness, from 0 to 1.
 Pattern = Callable[[FloatArray, FloatArray], FloatArray]
 
-# Periods in pixels.
+# Range of the period in pixels.
 _PERIODS = {"orchard": (10, 18), "vineyard": (4, 9), "blocks": (28, 48), "panels": (9, 16)}
 
-# No tool takes less.
+# The least search radius of any tool.
 _LEAST_RADIUS_PX = 3.0
 
 
 def orchard(along: FloatArray, across: FloatArray) -> FloatArray:
-    """Trees at the crossings of a lattice."""
+    """Trees at the nodes of a lattice."""
     away = np.hypot(along - np.rint(along), across - np.rint(across))
     return np.clip((0.33 - away) / 0.1, 0, 1)
 
@@ -36,7 +36,7 @@ def vineyard(along: FloatArray, across: FloatArray) -> FloatArray:
 
 
 def blocks(along: FloatArray, across: FloatArray) -> FloatArray:
-    """Blocks of a town, all alike, between streets."""
+    """Identical blocks of a town between streets."""
     u, v = along % 1, across % 1
     street = (u < 0.15) | (v < 0.15)
     house = (u > 0.25) & (u < 0.9) & (v > 0.3) & (v < 0.55)
@@ -57,7 +57,7 @@ _PATTERNS: dict[str, Pattern] = {
 
 
 def repeating(name: str) -> Make:
-    """Cover the scene, all of it or most, by a pattern; ask for a radius that may be too small."""
+    """Cover all or most of the scene with a pattern; the search radius may be too small."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
@@ -108,7 +108,7 @@ def repeating(name: str) -> Make:
 
 
 def repeated_patch(pair: Pair, setting: Setting) -> Pair:
-    """The same piece of ground all over, as both images truly show it; a frame may be its own."""
+    """Repeat one piece of ground in both images, sometimes within a frame of other ground."""
     rng = setting.rng
     shift, side = direction(rng, 5.0, 20.0), int(rng.integers(24, 70))
     moved = pair.moved(shift, as_text(shift))

@@ -1,4 +1,4 @@
-"""Scenes that are attacked: windows of real pairs, and simulated ones."""
+"""Scenes for the attacks: windows of real pairs, and simulated ones."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ SAR_SAR = "sar-sar"
 LARGE = "-large"
 DENSITIES = ("rural", "suburban", "urban", "city")
 
-# Sides of the windows in pixels, of real pairs and simulated ones, and of large windows of them;
-# and what is kept free around them for what lies elsewhere.
+# Least and largest sides of the windows in pixels, by source and size; and the margin around
+# windows for displaced content.
 _SIDES_PX, _LARGE_SIDES_PX = (300, 400), (450, 900)
 _SIMULATED_SIDES_PX, _SIMULATED_LARGE_SIDES_PX = (320, 480), (700, 1000)
 _MARGIN_PX = 26
 _LEAST_SIDE_PX = 200
 
-# Scenes that satellites of medium resolution have seen, and a pixel of theirs.
+# Scenes of satellites of medium resolution, and their pixel size.
 _COARSE = ("so-sentinel", "so-cloudy-sentinel", "oo-cloudy-sentinel", "oo-nanjing", "oi-sardinia")
 _COARSE_M = 10.0
 
-# Seeds of further simulated scenes of a kind: far from one another, odd, so that looks differ.
+# Seeds of further simulated scenes of a kind: far apart, and odd so that their looks differ.
 _FURTHER_SEEDS = 1001
 
-# Truths that may be 3 px wrong cannot tell what is 3 px wrong.
+# A truth that may be wrong by 3 px cannot reveal an error of 3 px.
 _LARGEST_SIGMA_PX = 2.0
 
-# So many bands or more are a multispectral image: red, green and blue of them.
+# From this number of bands an image is multispectral; its red, green and blue are taken.
 _MANY_BANDS = 8
 _RGB = (3, 2, 1)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Where pairs are cut from.
+    """A scene from which pairs are cut.
 
     Parameters
     ----------
     name, kind, sigma_px
-        As of a real case; simulated ones have an exact truth.
+        As of a real case; simulated scenes have an exact truth.
     case
         The real pair; None: simulated.
     """
@@ -80,12 +80,12 @@ class Scene:
 
     @property
     def place(self) -> str:
-        """What is shown."""
+        """The place that is shown."""
         return self.name if self.case is None else self.case.place
 
     @property
     def density(self) -> str:
-        """How densely a simulated scene is built up; empty for real ones."""
+        """How densely a simulated scene is built up; empty for real scenes."""
         return self._simulated_name.rstrip("23") if self.case is None else ""
 
     @property
@@ -93,7 +93,7 @@ class Scene:
         return self.name.removesuffix(LARGE).partition("-")[2]
 
     def source(self, seed: int, cache: Path) -> Source:
-        """Return the whole scene; simulated ones are made unless the folder `cache` has them."""
+        """Return the whole scene; a simulated one is made unless the folder `cache` has it."""
         if self.case is not None:
             return Source(
                 *_real(self.case.reference, self.case.input), self.case.reference_to_input
@@ -104,7 +104,7 @@ class Scene:
         return _simulated(self.kind, self.density, size_px, seed + _FURTHER_SEEDS * further, cache)
 
     def pair(self, seed: int, cache: Path) -> Pair:
-        """Return a window, the same for the same seed, whose ground lies as the images claim."""
+        """Return a window with correct georeferencing; the same seed gives the same window."""
         source = self.source(seed, cache)
         rng = np.random.default_rng((zlib.crc32(self.name.encode()), seed))
         most = np.array(source.reference.shape[:0:-1]) - 2 * _MARGIN_PX
@@ -133,9 +133,9 @@ class Scene:
 def _corner(
     source: Source, side: NDArray[np.int_], most: NDArray[np.int_], rng: np.random.Generator
 ) -> NDArray[np.int_]:
-    """Return the first pixel of the window of a few whose input holds most."""
+    """Return the first pixel of a window, of several drawn ones, whose input is nearly fullest."""
     tries = _MARGIN_PX + rng.integers(0, most - side + 1, (5, 2))
-    # Some centres of real scenes hold all there is.
+    # Some real scenes hold data only around their centres.
     tries = np.vstack([tries, _MARGIN_PX + (most - side) // 2])
     shares = [
         render(source, pixels((int(side[0]), int(side[1])))[::8, ::8] + first)[1].mean()
@@ -146,7 +146,7 @@ def _corner(
 
 
 def scenes(data: Path) -> tuple[Scene, ...]:
-    """Return the scenes: of the folder of real pairs, and simulated; large ones, too."""
+    """Return real and simulated scenes, including the large ones."""
     real = [
         Scene(case.name, case.kind, case.sigma_px, case)
         for case in read_cases(data)
@@ -165,14 +165,14 @@ def scenes(data: Path) -> tuple[Scene, ...]:
 
 
 def _has_room(case: RealCase, side_px: int) -> bool:
-    """Whether windows of a side can be cut from a real pair."""
+    """Whether windows with a side can be cut from a real pair."""
     return min(image_size(case.reference)) >= side_px + 2 * _MARGIN_PX
 
 
 def elsewhere(
     pair: Pair, others: Sequence[Scene], rng: np.random.Generator, seed: int, cache: Path
 ) -> Pair:
-    """Return a pair with an input of another place, of a pair of the same kind if there is one."""
+    """Return the pair with an input of another place, if possible from a pair of the same kind."""
     other_places = [one for one in others if one.place not in pair.place]
     choice = [one for one in other_places if one.kind == pair.kind] or other_places
     for _ in range(20):
@@ -193,7 +193,7 @@ def _real(reference: Path, input: Path) -> tuple[Image, Image]:
 
 
 def to_grey(image: NDArray[Any]) -> Image:
-    """Return bands as bytes from 1 to 255: what an export for people has."""
+    """Return bands as bytes from 1 to 255, as an export for viewing has."""
     if len(image) >= _MANY_BANDS:
         image = image[list(_RGB)]
     image = image[:3]
@@ -201,7 +201,7 @@ def to_grey(image: NDArray[Any]) -> Image:
         return np.maximum(image, 1)
     low, high = (np.nanpercentile(image, share, axis=(1, 2)) for share in (0.5, 99.5))
     if image.min() >= 0:
-        # Amplitudes stay in proportion, as speckle is multiplied.
+        # Speckle is multiplicative, so amplitudes keep their ratios.
         low = np.zeros_like(low)
     return to_bytes((image - low[:, None, None]) / (high - low)[:, None, None] * 254 + 1)
 

@@ -1,6 +1,6 @@
-"""Attacks on RPCs and ground control: cities and suburbs of `simulate_sensor`, as they are or not.
+"""Attacks on RPCs and ground control: scenes of `simulate_sensor`, unchanged or attacked.
 
-What is changed is the image; where its content moved, so does the truth at the check points.
+Attacks change the image; where they move its content, the truth at the check points moves, too.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ TOOLS = ("refine_rpc", "extract_gcps")
 _SIDES_PX = (420, 560)
 _SHIFT_M = 40.0
 
-# Of an image's bands: what it is changed to, and by how much content moved at positions (n, 2);
-# NaN: it is no longer shown.
+# Takes an image's bands; returns the changed bands, and the function that gives the movement of
+# the content at positions (n, 2). NaN: it is no longer shown.
 Moved = Callable[[FloatArray], FloatArray]
 Change = Callable[[Image, np.random.Generator], tuple[Image, Moved]]
 
@@ -55,7 +55,7 @@ def noisy(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
 
 
 def lower_part(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
-    """Move the lower half or third of the rows sideways and along, as a strip of another pass."""
+    """Move the lower 30 to 60 % of the rows, as if they were a strip of another pass."""
     first = int(image.shape[1] * rng.uniform(0.4, 0.7))
     right, down = (int(n) for n in np.rint(direction(rng, 6.0, 20.0)))
     made = image.copy()
@@ -70,7 +70,7 @@ def lower_part(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
 
 
 def labelled(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
-    """Put labels and roads over it."""
+    """Put labels and roads over the image."""
     put = OVERLAYS["labels and roads"](image.shape[1:], rng).change()
     scale = 255 / float(image.max())
     return _like(image, put((image * scale).astype(np.uint8)) / scale), _nowhere
@@ -82,7 +82,7 @@ def _like(image: Image, values: FloatArray) -> Image:
     return np.where(image.any(axis=0), made, 0).astype(image.dtype)
 
 
-# Class, variant, density, share of changed buildings in per cent, change.
+# Group, attack, density, share of changed buildings in percent, change.
 _ATTACKS: tuple[tuple[str, str, str, float, Change], ...] = (
     ("RPCs in a dense city", "-", "city", 0.0, as_it_is),
     ("RPCs in a dense city", "rebuilt", "city", 30.0, as_it_is),
@@ -109,11 +109,11 @@ class SensorCase:
 
     @property
     def name(self) -> str:
-        """What repeats it alone."""
+        """Name by which this case can be repeated."""
         return "/".join((self.attack, self.variant, self.scene, self.tool, str(self.seed)))
 
     def make(self, folder: Path) -> tuple[Path, Moved]:
-        """Write the attacked scene into a folder; return it and what moved."""
+        """Write the attacked scene into a folder; return the folder and how the content moved."""
         one = next(a for a in _ATTACKS if a[:2] == (self.attack, self.variant))
         rng = np.random.default_rng((zlib.crc32("/".join(one[:2]).encode()), self.seed))
         size = int(rng.integers(*_SIDES_PX))
@@ -125,7 +125,7 @@ class SensorCase:
         return folder, moved
 
     def save(self, folder: Path) -> None:
-        """Write the scene into a folder, to be looked at."""
+        """Write the scene into a folder for inspection."""
         self.make(folder)
 
     def _simulated(self, density: str, changed: float, size: int, looks: float) -> Path:
@@ -142,7 +142,7 @@ class SensorCase:
         return kept(self.cache / "-".join(map(str, ("attacked-sensor", *parts))), make)
 
     def run(self, workers: int | None) -> AttackOutcome:
-        """Make the scene, let the tool try, and judge what it wrote."""
+        """Make the scene, call the tool, and judge what it wrote."""
         with tempfile.TemporaryDirectory() as temporary:
             scene, moved = self.make(Path(temporary) / "scene")
             wanted = RUNS[self.tool]
@@ -164,9 +164,9 @@ class SensorCase:
 
 
 def errors_px(scene: Path, output: Path, moved: Moved) -> FloatArray:
-    """Return by how much what was written misses the scene's check points, (n, 2).
+    """Return the misses of a tool's output at the scene's check points, shape (n, 2).
 
-    Of ground control points, the affine change of the image that fits them best is compared.
+    Ground control points are judged by the affine change of the image that fits them best.
     """
     crs = crs_of(scene / "reference.tif")
     checks = scene / "check_points.csv"
@@ -180,7 +180,7 @@ def errors_px(scene: Path, output: Path, moved: Moved) -> FloatArray:
 
 
 def sensor_cases(seeds: Sequence[int], cache: Path) -> list[SensorCase]:
-    """Return every attack on every tool, seed by seed."""
+    """Return every attack on every tool, ordered by seed."""
     return [
         SensorCase(attack, variant, tool, seed, cache)
         for seed in seeds

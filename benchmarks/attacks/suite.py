@@ -1,4 +1,4 @@
-"""The suite of attacks: which cases are run, and what became of them."""
+"""The suite of attacks: which cases are run, and their outcomes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .tries import AttackOutcome
 AnyCase = AttackCase | SensorCase
 
 _WANTED_RUNS = 3000
-# Seeds of the whole suite: as many as give the wanted runs. Of a sample or of classes, any number.
+# Most seeds of the whole suite: enough for the wanted runs. Samples and classes have no limit.
 _SEEDS = 4
 _QUICK = 20
 
@@ -54,7 +54,7 @@ def run(settings: Settings) -> SuiteResult:
 
 
 def choose(settings: Settings, tools: Collection[str] | None = None) -> list[AnyCase]:
-    """Return the cases that settings ask for, on some tools; None: on all."""
+    """Return the cases that the settings ask for, on the given tools; None: on all."""
 
     def is_asked(case: AnyCase) -> bool:
         return tools is None or case.tool in tools
@@ -72,9 +72,9 @@ def choose(settings: Settings, tools: Collection[str] | None = None) -> list[Any
 
 
 def sample(every: Sequence[AnyCase], number: int) -> list[AnyCase]:
-    """Return some cases, the same every time: of every class about as many.
+    """Return a reproducible sample of the cases with about equally many of every class.
 
-    One of each class comes first, so that what was run until somebody stops is a sample, too.
+    One of each class comes first, so that a run that is stopped early is a sample, too.
     """
     turn: Counter[str] = Counter()
     ranked = []
@@ -85,7 +85,7 @@ def sample(every: Sequence[AnyCase], number: int) -> list[AnyCase]:
 
 
 def goals(attacks: Sequence[AttackOutcome]) -> tuple[Goal, ...]:
-    """Return the goal and what was found."""
+    """Return the goal and its result."""
     wrong = sum(o.verdict == SILENTLY_WRONG for o in attacks)
     reached = False if wrong else (True if len(attacks) >= _WANTED_RUNS else None)
     return (
@@ -98,7 +98,7 @@ def goals(attacks: Sequence[AttackOutcome]) -> tuple[Goal, ...]:
 def verdict_table(
     title: str, outcomes: Sequence[AttackOutcome], key: Callable[[AttackOutcome], str]
 ) -> Table:
-    """Return how many outcomes of each key have each verdict."""
+    """Return the number of outcomes with each verdict, by key."""
     rows = []
     for name in sorted({key(outcome) for outcome in outcomes}):
         some = [outcome for outcome in outcomes if key(outcome) == name]
@@ -110,7 +110,7 @@ def verdict_table(
 
 
 def rules_table(outcomes: Sequence[AttackOutcome]) -> Table:
-    """Return which rules refused attacks and controls."""
+    """Return the rules that refused attacks and controls."""
     refused = [outcome for outcome in outcomes if outcome.verdict == REFUSED]
     counts = Counter((o.rule or "no rule", o.group == CONTROLS) for o in refused)
     names = sorted({rule for rule, _ in counts})
@@ -119,7 +119,7 @@ def rules_table(outcomes: Sequence[AttackOutcome]) -> Table:
 
 
 def wrong_table(outcomes: Sequence[AttackOutcome]) -> Table:
-    """Return what is silently wrong, by the names that repeat it."""
+    """Return the silently wrong results, with the names by which they can be repeated."""
     rows = [
         [f"`{o.name}`", f"{o.error_px:.1f}", f"{o.claimed_ce90_px:.2f}", o.note]
         for o in outcomes

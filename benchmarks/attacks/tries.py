@@ -1,4 +1,4 @@
-"""What became of one attack, and how a tool is let try."""
+"""The outcome of one attack, and the call of a tool."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ ACCEPTED = "accepted"
 
 @dataclass(frozen=True)
 class AttackOutcome:
-    """What became of one attack.
+    """The outcome of one attack.
 
     Parameters
     ----------
     name, group, attack, variant, scene, kind, tool, seed
-        Which case.
+        The case.
     verdict
         One of `accuracy.VERDICTS`; `ACCEPTED` until it is judged.
     sigma_px
-        How far the truth can be believed.
+        Uncertainty of the truth.
     error_px, rmse_px
-        What 90 % of the errors do not exceed, and their root mean square; NaN if refused.
+        The 90 % quantile of the errors, and their root mean square; NaN if refused.
     claimed_ce90_px
-        What the tool itself claims for the former.
+        The tool's own estimate of the former.
     rule, reason
-        What refused it, and what the tool said.
+        The rule that refused, and the tool's message.
     note
-        What was drawn.
+        The random choices.
     seconds
         Wall-clock time of the call.
     """
@@ -60,7 +60,7 @@ class AttackOutcome:
     seconds: float
 
     def record(self) -> dict[str, Any]:
-        """Return the outcome as values that JSON can carry."""
+        """Return the outcome as JSON-compatible values."""
         return plain(asdict(self))
 
     def line(self) -> str:
@@ -71,7 +71,7 @@ class AttackOutcome:
 
 
 class Named(Protocol):
-    """What identifies a case."""
+    """The names that identify a case."""
 
     @property
     def name(self) -> str: ...
@@ -92,14 +92,14 @@ class Named(Protocol):
 def attempted(
     case: Named, kind: str, sigma_px: float, note: str, call: Callable[[], Any]
 ) -> tuple[Any, AttackOutcome]:
-    """Call a tool; return its result, None if there is none, and the outcome before it is judged.
+    """Call a tool; return its result (None: it has none), and the outcome before it is judged.
 
     Parameters
     ----------
     case
-        What is tried.
+        The case to try.
     kind, sigma_px, note
-        Of its pair.
+        Of the case's pair.
     call
         Calls the tool.
     """
@@ -112,10 +112,10 @@ def attempted(
         verdict, judged = REFUSED, refusal.verdict
         rule, reason = ("", str(refusal)) if judged is None else (judged.rule, judged.reason)
     except GroundTieError as error:
-        # Bad input, named in one line.
+        # Bad input, reported in one line.
         verdict, rule, reason = REFUSED, "bad input", str(error)
     except Exception as error:
-        # A finding like any other: it is counted, and `run.py` exits with 1.
+        # A crash is a finding, too: it is counted, and `run.py` exits with 1.
         traceback.print_exc()
         verdict, reason = CRASHED, repr(error)
     return result, AttackOutcome(

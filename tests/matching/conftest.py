@@ -1,4 +1,4 @@
-"""A pair that the tests of the search share, opened once."""
+"""Pairs that the tests of the search share, opened once."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def textured(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
 
 @pytest.fixture(scope="session")
 def other_place(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
-    """Return a pair of two places."""
+    """Return a pair of images of different places."""
     folder = tmp_path_factory.mktemp("other")
     return write_textured_pair(folder, (260, 240), shift_on_map(0, 0), input_seed=99)
 

@@ -40,7 +40,7 @@ def centres() -> np.ndarray:
 
 
 def distortion(kind: str, px: np.ndarray) -> np.ndarray:
-    """Where the input claims grid pixels to be: a misregistration of a kind, up to 6 px."""
+    """Stated positions of grid pixels in the input: a misregistration of a kind, up to 6 px."""
     middle = SIZE / 2
     off = np.asarray(px, float) - middle
     u, v = (off / middle.max()).T
@@ -60,12 +60,12 @@ def distortion(kind: str, px: np.ndarray) -> np.ndarray:
 def surfaces_of(
     kind: str, px: np.ndarray, prior: Affine, seed: int, wrong: float = 0.4
 ) -> np.ndarray:
-    """Surfaces that peak where chips lie, over a correlated background; many peak elsewhere."""
+    """Surfaces that peak where chips lie, over a correlated background; a share peaks elsewhere."""
     return surfaces_at(apply_affine(~prior, distortion(kind, px)) - px, seed, wrong)
 
 
 def surfaces_at(shifts: np.ndarray, seed: int, wrong: float = 0.4) -> np.ndarray:
-    """Surfaces that peak at shifts, (n, 2), but for those that are wrong."""
+    """Surfaces that peak at shifts, (n, 2), except for a share of wrong ones."""
     px, shifts = shifts, shifts.copy()
     rng = np.random.default_rng(seed)
     assert np.abs(shifts).max() < RADIUS - 1
@@ -110,7 +110,7 @@ def test_the_model_behind_the_surfaces_is_found(kind: str, prior: Affine) -> Non
 
 @pytest.fixture
 def fitted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Which kinds of models have been fitted."""
+    """The kinds of models that have been fitted."""
     kinds: list[str] = []
     fit = alignment._align
 
@@ -149,7 +149,7 @@ def test_nothing_is_chosen_but_candidates(fitted: list[str]) -> None:
 
 
 def test_left_out_similarity_is_that_of_the_right_chips() -> None:
-    """At the model's place a wrong chip's surface is background, which is 0 on average."""
+    """A wrong chip's surface at the model's place is background, which is 0 on average."""
     px = centres()
     scores = []
     for wrong in (0.0, 0.5):
@@ -206,7 +206,7 @@ def test_parameters_of_a_model_are_found_again(kind: str) -> None:
 
 
 def test_the_spline_looks_up_the_surface_itself() -> None:
-    """At whole shifts it gives the surface's values, up to the chip's weight; beyond, nothing."""
+    """At whole shifts it returns the surface's values times the chip's weight; beyond, 0."""
     px = centres()[:4]
     surfaces = surfaces_of("translation", px, Affine.identity(), 0)
     field = _fields(px, surfaces, IDENTITY)[-1]
@@ -222,13 +222,13 @@ def test_the_spline_looks_up_the_surface_itself() -> None:
 
 
 class TestHeights:
-    """Chips on hills, of which the input was orthorectified with other heights."""
+    """Chips on hills; the input was orthorectified with other heights."""
 
     GRID = Grid(Affine(10, 0, 4e5, 0, -10, 5e6), CRS.from_epsg(32633), 600, 500)
     SIGHT_PX = np.array([-0.045, 0.01])  # for a metre
 
     def terrain(self, seed: int = 0) -> Terrain:
-        """Hills of 100 m, of which the input's have errors of about 30 m."""
+        """Hills of 100 m; the input's heights have errors of about 30 m."""
         rng = np.random.default_rng(seed)
         rough = rng.normal(size=(2, 500, 600))
         hills, errors = (

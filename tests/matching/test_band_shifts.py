@@ -1,4 +1,4 @@
-"""Bands of one file that show the ground at other pixels than the band before."""
+"""Bands of one file that are displaced against the band before."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ SHIFT = (-4, 9)
 
 
 def found_in(path: Path) -> list[BandShift]:
-    """Return the bands that are displaced."""
+    """Return the displaced bands."""
     with open_raster(path) as source:
         return [one for one in band_shifts(source) if one.apart_px > 2]
 
 
 def moved(band: np.ndarray, shift: tuple[int, int] = SHIFT) -> np.ndarray:
-    """Return a band whose content lies rows and columns further on."""
+    """Return a band with its content displaced by rows and columns."""
     return np.roll(band, shift, axis=(0, 1))
 
 
 @pytest.fixture
 def bands() -> np.ndarray:
-    """Return three bands of one ground, of other contrast and with noise of their own."""
+    """Return three bands of one ground, with different contrast and independent noise."""
     ground, rng = 128 + 40 * texture(400, 420), np.random.default_rng(4)
     noise = 3 * rng.normal(size=(3, 400, 420))
     return np.stack([ground, 255 - 0.7 * ground, 20 + 0.4 * ground]) + noise
@@ -41,7 +41,7 @@ def test_a_band_that_was_moved_is_found_and_how_far(
 ) -> None:
     bands[number - 1] = moved(bands[number - 1])
     found = found_in(write_raster(tmp_path / "i.tif", bands.astype(np.float32)))
-    # All are seen from the first.
+    # All bands are compared with the first.
     expected = [(1, 2), (1, 3)] if number == 1 else [(1, number)]
     assert [one.bands for one in found] == expected
     assert [one.apart_px for one in found] == pytest.approx(
@@ -92,7 +92,7 @@ def test_bands_of_noise_or_of_nothing_are_not_displaced(tmp_path: Path) -> None:
 
 
 def test_the_edges_of_nodata_hide_no_shift(bands: np.ndarray, tmp_path: Path) -> None:
-    """All bands have the same wedge without data, which is not moved."""
+    """All bands have the same nodata wedge, which is not displaced."""
     bands[2] = moved(bands[2])
     rows, cols = np.indices(bands.shape[1:])
     bands[:, rows + cols < 250] = 0

@@ -20,7 +20,7 @@ def peaks(surfaces: np.ndarray) -> np.ndarray:
 
 
 def surfaces_peaking_at(shifts: np.ndarray, heights: object, seed: int) -> np.ndarray:
-    """Return white noise of unit variance with a peak of some height at each shift (x, y)."""
+    """Return white noise of unit variance with a peak of a given height at each shift (x, y)."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[-RADIUS : RADIUS + 1, -RADIUS : RADIUS + 1]
     dx, dy = (np.asarray(shifts, float)[:, k, None, None] for k in (0, 1))
@@ -35,7 +35,7 @@ def lattice(columns: int, rows: int) -> np.ndarray:
 
 
 def smooth_shifts(centres: np.ndarray) -> np.ndarray:
-    """Return shifts that vary by up to 1.3 px from chip to chip and 5 px altogether."""
+    """Return shifts that vary by up to 1.3 px from chip to chip and by 5 px in total."""
     x, y = centres.T * 2 * np.pi / (12 * SPACING)
     return 2.5 * np.column_stack([np.sin(x + 0.3) * np.cos(0.7 * y), np.cos(x) * np.sin(0.8 * y)])
 
@@ -75,7 +75,7 @@ def test_outliers_in_a_smooth_field_are_recovered(seed: int) -> None:
 def test_distortion_of_a_few_chips_is_not_smoothed_away() -> None:
     centres = lattice(11, 11)
     from_middle = np.hypot(*(centres - centres.mean(axis=0)).T) / SPACING
-    # A dome five chips wide whose middle lies 4 px off its surroundings.
+    # A dome five chips wide whose middle is displaced by 4 px against its surroundings.
     dome = 4 * np.exp(-0.5 * (from_middle / 1.7) ** 2)
     shifts = np.column_stack([dome, -0.5 * dome])
     surfaces = surfaces_peaking_at(shifts, 6.0, 4)
@@ -84,7 +84,7 @@ def test_distortion_of_a_few_chips_is_not_smoothed_away() -> None:
         for found in (surfaces, propagate(surfaces, centres, REACH))
     )
     assert np.hypot(*propagated.T).mean() < np.hypot(*alone.T).mean()
-    # Of the dome at least four fifths remain.
+    # At least four fifths of the dome remain.
     assert np.hypot(*propagated[from_middle < 1.5].mean(axis=0)) < 0.2 * dome.max()
 
 
@@ -96,7 +96,7 @@ def test_a_step_between_two_areas_stays_where_it_is() -> None:
 
 
 def test_evidence_reaches_along_lines_of_chips() -> None:
-    # As chips of the fit lie: on the lines between held-out blocks, most with two neighbours.
+    # Arranged like chips of the fit: on lines between held-out blocks, most with two neighbours.
     everywhere = lattice(13, 13)
     cols, rows = (everywhere // SPACING).T
     centres = everywhere[(cols % 4 == 0) | (rows % 4 == 0)]
@@ -137,7 +137,7 @@ def test_flat_surfaces_send_nothing_and_receive() -> None:
     assert near_truth(found, shifts).all()
     flat = np.zeros_like(surfaces)
     received = propagate(flat, centres, REACH)
-    # The border cannot be reached from all sides; nothing else distinguishes shifts.
+    # The border cannot be reached from all sides; nothing else distinguishes the shifts.
     assert np.isfinite(received).all()
     np.testing.assert_allclose(received, received[:, ::-1, ::-1], atol=1e-4)
 
@@ -145,7 +145,7 @@ def test_flat_surfaces_send_nothing_and_receive() -> None:
 def test_two_chips_agree_with_bayes_rule() -> None:
     surfaces = surfaces_peaking_at(np.array([[1, 0], [2, -1]]), 3.0, 9)
     found = propagate(surfaces, np.array([[0, 0], [SPACING, 0]]), REACH)
-    # Sum-product is exact on a tree: the sum over all pairs of shifts, by the prior shares.
+    # Sum-product is exact on a tree: the sum over all pairs of shifts, weighted by the prior.
     likely = np.exp(surfaces.astype(float)).reshape(2, -1)
     evidence = 0.7 + 0.3 * likely / likely.mean(axis=1, keepdims=True)
     axis = np.arange(-RADIUS, RADIUS + 1.0)
@@ -154,7 +154,7 @@ def test_two_chips_agree_with_bayes_rule() -> None:
     joint = 0.9 * related + 0.1 / axis.size**2
     marginal = evidence[0] * (joint @ evidence[1])
     difference = found[0].ravel() - np.log(marginal)
-    # Up to a constant; the density is taken for the sum over shifts.
+    # Equal up to a constant, as the density replaces the sum over shifts.
     np.testing.assert_allclose(difference - difference.mean(), 0, atol=2e-3)
 
 

@@ -17,7 +17,7 @@ from groundtie.similarity.surface import SimilaritySettings
 
 SETTINGS = SimilaritySettings("orientation")
 
-# Off by three pixels along each axis, as a fitted model is not.
+# Wrong by three pixels along each axis, more than a fitted model.
 COARSE = shift_on_map(40.0, -15.0)
 
 
@@ -33,7 +33,7 @@ def test_check_points_search_around_the_model_alone(
     assert check.is_check.all()
     assert len(check) == len(HeldOut.of(pair).layout.check_centres)
     assert rms((check.input_px - textured.truth(check.reference_xy))[check.used]) < 0.5
-    # Their matches are not drawn towards the model that they are to judge.
+    # The matches of check points are not drawn towards the model under test.
     elsewhere = checked(pair, shift_on_map(95.0, -65.0), context).points
     np.testing.assert_allclose(elsewhere.input_px, check.input_px, atol=0.5)
 

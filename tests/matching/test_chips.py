@@ -25,7 +25,7 @@ CHIP, RADIUS = 40, 10
 CENTRES = np.array([[60, 60], [130, 120], [200, 170]])
 SETTINGS = SimilaritySettings("orientation")
 
-# Nominally the input shows the ground 70 m east and 45 m south: 7 columns right and 4.5 rows down.
+# The input's nominal displacement is 70 m east and 45 m south: 7 columns and 4.5 rows.
 SHIFT_PX = (7.0, 4.5)
 NOMINAL = shift_on_map(0.0, 0.0)
 

@@ -52,7 +52,7 @@ def test_the_best_candidate_is_the_shift(pair: ImagePair, context: Context) -> N
     assert [c.height for c in found] == sorted((c.height for c in found), reverse=True)
     places = np.array([shift_m(c) for c in found])
     gaps = np.abs(places[:, None] - places[None]).max(axis=2)[np.triu_indices(len(found), 1)]
-    # Candidates are at least four pixels apart, but for their sub-pixel parts.
+    # Candidates are at least four pixels apart, except for their sub-pixel parts.
     assert (gaps > 30).all()
 
 
@@ -89,7 +89,7 @@ def test_what_repeats_matches_a_period_off_at_the_same_rotation(
     high = [one for one in found if one.height > 0.8 * found[0].height]
     centre = pair.grid.pixel_to_map([pair.grid.centre_px])
     moved_m = [np.hypot(*(one.model(centre) - centre)[0]) for one in high]
-    # The place itself, and at least one of its neighbours.
+    # The true place, and at least one of its neighbours.
     assert min(moved_m) == pytest.approx(0, abs=0.05 * period_m)
     assert max(moved_m) == pytest.approx(period_m, rel=0.05)
 
@@ -132,7 +132,7 @@ def test_a_mask_is_named_for_what_it_hides_and_nothing_else(
     grid = textured.grid
     values = np.random.default_rng(0).integers(1, 1000, (240, 260)).astype(np.uint16)
     if content != "texture":
-        # What the mask below shows, and the reach of interpolation around it.
+        # The pixels visible through the mask below, extended by the reach of interpolation.
         values[:200] = 0 if content == "nodata" else 5
     if content in ("nodata", "constant"):
         values[200:] = values[0, 0]

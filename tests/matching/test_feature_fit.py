@@ -15,7 +15,7 @@ AREA = np.pi * 16**2
 def matches(
     truth: Affine, bend: float = 0.0, right: int = 60, wrong: int = 200, seed: int = 0
 ) -> Correspondences:
-    """Return matches with a small misregistration; wrong ones fall anywhere in the gate."""
+    """Return matches with a small misregistration; wrong ones are spread over the gate."""
     rng = np.random.default_rng(seed)
     px = rng.uniform(0, 600, (right + wrong, 2))
     partner = apply_affine(truth, px)

@@ -24,10 +24,10 @@ from groundtie.similarity.surface import SimilaritySettings
 
 SIZE = (400, 380)
 FUSED = SimilaritySettings("fused")
-# The truth is 6 px east and 4 px south; the coarse model is off by 5 px.
+# The truth is 6 px east and 4 px south; the coarse model is wrong by 5 px.
 TRUTH, COARSE = shift_on_map(60.0, -40.0), shift_on_map(30.0, 0.0)
 
-# Roofs: their side, the distance between them, and how far they lie beside the ground.
+# Roofs: their side, their spacing, and their displacement against the ground.
 ROOF_PX, APART_PX, PARALLAX_PX = 20, 48, 4
 
 
@@ -60,7 +60,7 @@ def town(files: TexturedPair, tmp_path_factory: pytest.TempPathFactory) -> Textu
 def estimates(
     files: TexturedPair, kind: str = "auto", threshold: float = 0.03
 ) -> tuple[Transform, Estimate]:
-    """Return what keypoints show alone, and with chips all over the images."""
+    """Return the models from keypoints alone, and with chips all over the images."""
     with files.opened() as pair, threads(2) as context:
         held_out = HeldOut.of(pair)
         chips = SurfaceFit(ChipMatcher(pair, FUSED, held_out), held_out.layout, LINEAR_CANDIDATES)

@@ -1,4 +1,4 @@
-"""The promise of the verdict: what is held out of the fit changes nothing of the fit."""
+"""The promise of the verdict: held-out pixels do not influence the fit."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def registered(files: TexturedPair, kind: str, similarity: str) -> tuple[Estimat
 
 
 def spoiled(files: TexturedPair, folder: Path, emptied: bool) -> TexturedPair:
-    """Return the pair with a reference that shows noise or zeros wherever it is held out."""
+    """Return the pair with noise or zeros in the reference wherever it is held out."""
     with files.opened() as pair:
         layout = HeldOut.of(pair).layout
         grid = pair.reference.source.grid
@@ -86,14 +86,14 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
     for name, values in vars(estimate.points).items():
         np.testing.assert_array_equal(getattr(blind.points, name), values, err_msg=name)
     assert [m.to_json() for m in blind.fold_models] == [m.to_json() for m in estimate.fold_models]
-    # These pixels are all that the check points see.
+    # Check points see only these pixels.
     theirs = check.residual_px(estimate.transform)
     assert not np.array_equal(misled.residual_px(blind.transform), theirs)
     assert len(misled) == 0 or misled.score.mean() < 0.6 * check.score.mean()
 
 
 def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
-    """On its own pixels as the layout says; on larger ones also what they see of a block."""
+    """On the layout's own pixels exactly; on larger pixels, also all that see a part of a block."""
     held_out = HeldOut.of(pair)
     layout, grid = held_out.layout, pair.grid
     exact = layout.held_out(np.arange(float(grid.width)), np.arange(float(grid.height))[:, None])
@@ -108,7 +108,7 @@ def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
         )
         seen = exact[np.ix_(centres[1], centres[0])]
         assert mask[:40, :40][seen].all()
-        # By the reach of the kernel and no more: five pixels of the level a side of a block.
+        # Blocks grow only by the reach of the kernel: five pixels of the level on each side.
         blocks = layout.columns.cells * layout.rows.cells
         side = layout.columns.block / factor + 7
         assert mask.sum() <= blocks * side**2
@@ -119,7 +119,7 @@ def test_held_out_pixels_are_the_same_at_any_level(pair: ImagePair) -> None:
 def test_poses_are_searched_for_without_what_is_held_out_of_a_rotated_reference(
     tmp_path: Path, rotation_deg: float, pixel_m: float
 ) -> None:
-    """Windows of poses are north up; noise where the reference is held out changes none."""
+    """Windows of poses are north up; noise in held-out parts of the reference changes none."""
     side = 400
     centre = Affine.translation(500_000, 5_000_000)
     turned = compose(centre, Affine.rotation(rotation_deg), Affine.translation(-2000, 2000))
@@ -149,5 +149,5 @@ def test_poses_are_searched_for_without_what_is_held_out_of_a_rotated_reference(
         misled = read_windows(Image(reference), Image(source), (1.0, 1.0), held_out=held_out)
     np.testing.assert_array_equal(misled.reference.valid, seen.valid)
     np.testing.assert_array_equal(misled.reference.values[seen.valid], seen.values[seen.valid])
-    # More is left than the narrow lines between all that may see a block.
+    # More remains than the narrow lines between all pixels that may see a block.
     assert seen.valid.sum() > 0.3 * whole.sum()

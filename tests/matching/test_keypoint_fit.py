@@ -37,7 +37,7 @@ from groundtie.studies.sift_variants import SiftVariantDescriptor, sift_detector
 SIZE = (300, 280)
 NMI = SimilaritySettings("nmi")
 KEYPOINTS = SiftOctDetector(0.075), SiftDescriptor()
-# The truth is 60 m east and 45 m south, pixels are 10 m: the coarse model is off by 5 px.
+# The truth is 60 m east and 45 m south, pixels are 10 m: the coarse model is wrong by 5 px.
 TRUTH, COARSE = shift_on_map(60.0, -45.0), shift_on_map(30.0, -5.0)
 
 
@@ -71,7 +71,7 @@ def keypoints_of(
     detector: Detecting = KEYPOINTS[0],
     descriptor: Describing = KEYPOINTS[1],
 ) -> tuple[Correspondences, ConsensusFit]:
-    """Return what keypoints show without chips."""
+    """Return the correspondences and the fit from keypoints without chips."""
     matcher = KeypointMatcher(pair, detector, descriptor, held_out=HeldOut.of(pair))
     with threads(2) as context:
         return agreeing_keypoints(matcher, coarse, kind, context)
@@ -88,7 +88,7 @@ def error_of(fit: ConsensusFit, files: TexturedPair) -> float:
 def test_a_misregistration_is_recovered(files: TexturedPair, kind: str) -> None:
     with files.opened() as pair:
         found = estimate_of(pair, kind)
-    # A spline sways with each of its points.
+    # A spline follows each of its points.
     assert error_px(found.transform, files) < (0.6 if kind == "tps" else 0.4)
     assert found.points.used.sum() > 15
     assert not found.points.is_check.any()
@@ -144,7 +144,7 @@ def test_pixels_held_out_of_the_fit_change_nothing_of_it(
 
 @dataclass(frozen=True)
 class Astray:
-    """Matches that are off by more the farther right they lie."""
+    """Matches whose error grows to the right."""
 
     pair: ImagePair
     held_out: HeldOut
@@ -159,14 +159,14 @@ class Astray:
         partner = grid.map_to_pixel(TRUTH(grid.pixel_to_map(px)))
         partner = partner - (grid.map_to_pixel(coarse(grid.pixel_to_map(px))) - px)
         partner[:, 0] += self.most_px * px[:, 0] / grid.width
-        # Nearly all agree on a wrong place; so few others are no rival.
+        # Nearly all agree on a wrong place; the few others are no rival.
         partner[np.arange(len(px)) % 20 > 0, 1] += self.wrong_px
         return Correspondences(px, partner, np.full(len(px), 2.0), float(np.pi * radius_px**2))
 
 
 @pytest.mark.slow
 def test_chips_are_matched_again_where_the_first_model_went_astray(files: TexturedPair) -> None:
-    """Right chips lie up to 7 px off the first model, and are looked for within 4 px of it."""
+    """Right chips lie up to 7 px off the first model, and are searched for within 4 px of it."""
     with files.opened() as pair, threads(2) as context:
         held_out = HeldOut.of(pair)
         fit = fit_of(pair, held_out, Astray(pair, held_out))  # type: ignore[arg-type]
@@ -180,7 +180,7 @@ def test_chips_are_matched_again_where_the_first_model_went_astray(files: Textur
 def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
     files: TexturedPair,
 ) -> None:
-    """Nothing is alike 14 px beside the truth."""
+    """Nothing matches 14 px beside the truth."""
     with files.opened() as pair, threads(2) as context:
         held_out = HeldOut.of(pair)
         astray = Astray(pair, held_out, most_px=0.0, wrong_px=14.0)
@@ -199,7 +199,7 @@ def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.M
     def places(matches: Correspondences) -> set[tuple[float, ...]]:
         return {tuple(row) for row in np.rint(np.hstack([matches.px, matches.partner_px]))}
 
-    # Each tile stretches its own grey values.
+    # Each tile is stretched by its own grey values.
     shared = places(whole) & places(parts)
     assert len(shared) > 0.6 * len(places(whole))
 
@@ -210,7 +210,7 @@ def test_a_tile_sees_all_that_its_keypoints_see_but_not_far_beyond_the_grid() ->
     far = 16 + tiles.MARGIN_PX
     left, right, down = 1024 - far, 1024 + 2 * far, 1024 + 16 + far
     assert keypoints.seen_around(middle, grid, 16) == Window(left, -16, right, down)
-    # To 16 px beyond the last column and the last row.
+    # Up to 16 px beyond the last column and the last row.
     assert keypoints.seen_around(last, grid, 16) == Window(
         2048 - far, 1024 - far, 952 + far + 16, 176 + far + 16
     )
@@ -239,7 +239,7 @@ def test_a_coarse_model_that_is_off_by_more_than_the_gate_finds_nothing_right(
             _, found = keypoints_of(pair, "affine", coarse=far)
         except TooFewPointsError:
             return
-    # What agrees then agrees by chance: a small part.
+    # The remaining agreement is by chance: a small part.
     assert found.mixture.inliers.mean() < 0.35
 
 

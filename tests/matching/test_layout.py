@@ -28,7 +28,7 @@ def laid_out(
 
 
 def pixels_of(centres: np.ndarray, chip: int, size: tuple[int, int]) -> np.ndarray:
-    """Return the mask of the pixels that lie in any of the chips."""
+    """Return the mask of the pixels that any of the chips covers."""
     mask = np.zeros(size[::-1], bool)
     for col, row in centres - chip // 2:
         mask[row : row + chip, col : col + chip] = True
@@ -72,7 +72,7 @@ def test_the_same_share_of_every_cell_is_held_out_and_chips_of_the_fit_reach_all
     cells = np.array([layout.columns.cells, layout.rows.cells])
     inner = np.array(size) - layout.chip_px
     expected = (_HELD_OUT * inner).prod()
-    # Each side of a block is right to a pixel.
+    # Each side of a block is accurate to a pixel.
     slack = (_HELD_OUT * inner + cells).prod() - expected
     assert abs(held_out_of(layout, size).sum() - expected) <= slack
     corners = layout.fit_centres - layout.chip_px // 2
@@ -124,7 +124,7 @@ def test_large_scenes_do_not_get_more_cells(source: RasterSource) -> None:
 def test_cells_are_counted_over_the_overlap_not_over_the_search_margin(
     source: RasterSource,
 ) -> None:
-    """Where the overlap is a half of the grid, the grid has twice as many cells."""
+    """If the overlap is half of the grid, the grid has twice as many cells."""
     layout = laid_out(source, (20_000, 20_000), overlap=(10_000, 20_000))
     assert (layout.columns.cells, layout.rows.cells) == (12, 6)
 

@@ -58,7 +58,7 @@ def test_a_level_corrects_a_model_that_is_off(
 def test_a_correction_comes_before_the_model_that_is_known(
     tmp_path: Path, context: Context
 ) -> None:
-    """From a model that rotates already: what is left is seen on the grid, not the nominal map."""
+    """With a rotating start model, the remaining error refers to the grid, not the nominal map."""
     files = write_textured_pair(tmp_path, (260, 240), similarity((70, -45), 4.0))
     with files.opened() as pair:
         start = similarity((20, 10), 3.0)

@@ -35,7 +35,7 @@ def looked_at(
     exact_px: float = EXACT_PX,
     sensors: Sensors = Sensors.CAMERAS,
 ) -> LockedContent | None:
-    """Look for content that two arrays of one grid have in common under a model."""
+    """Search two arrays on one grid for common content under a model."""
     grid = utm_grid(SIDE, SIDE)
     paths = [
         write_raster(folder / f"{name}.tif", np.rint(2000 + 300 * values).astype(np.uint16), grid)
@@ -49,7 +49,7 @@ def looked_at(
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0), width: int = 4) -> np.ndarray:
-    """Return an array with lines drawn at columns and rows, moved by an offset."""
+    """Return an array with lines drawn at columns and rows, displaced by an offset."""
     made = values.copy()
     first = 2 - width // 2
     end = first + width
@@ -60,13 +60,13 @@ def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0), width: int 
 
 
 def sensed(seed: int, noise: float = 0.4, place: int = 1) -> np.ndarray:
-    """Return one view of a place, with noise of its own."""
+    """Return one view of a place with independent noise."""
     ground = texture(SIDE, SIDE, place)
     return ground + noise * np.random.default_rng(seed).normal(size=ground.shape)
 
 
 def lies_at(locked: LockedContent, offset: tuple[float, float]) -> bool:
-    """Return whether what is drawn lies so many columns and rows off in the input."""
+    """Return whether the drawn content is displaced by so many columns and rows in the input."""
     reference = locked.pair.reference.source.grid
     place = [[10.0, 20.0]]
     return bool(np.allclose(locked.to_input(reference.pixel_to_map(place)) - place, offset))
@@ -91,7 +91,7 @@ def test_lines_that_are_drawn_over_different_ground_are_found(
 def test_lines_that_are_drawn_in_other_widths_are_found(
     tmp_path: Path, context: Context, widths: tuple[int, int]
 ) -> None:
-    """Their edges lie a pixel, or two, beside one another; of the thinnest a fraction of one."""
+    """Their edges lie a pixel or two beside one another; for the thinnest, a fraction of one."""
     reference, input = (
         drawn_into(sensed(seed, place=place), width=width)
         for seed, place, width in zip((1, 2), (1, 9), widths, strict=True)
@@ -109,14 +109,14 @@ def test_lines_that_are_drawn_in_other_widths_are_found(
 def test_edges_of_one_ground_lie_to_either_side(
     tmp_path: Path, context: Context, off_m: float
 ) -> None:
-    """Though a transform is one and a half pixels of 10 m wrong."""
+    """Even if the transform is wrong by one and a half pixels of 10 m."""
     model = shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, sensed(1), sensed(2), context, model)
     assert locked is not None and locked.shared.sameness.beside < 0.3
 
 
 def masked(folder: Path, locked: LockedContent | None) -> np.ndarray:
-    """Return what is masked of 200 × 200 pixels, from column 20 and row 0 on."""
+    """Return the mask over 200 × 200 pixels, from column 20 and row 0."""
     assert locked is not None
     with open_raster(folder / "reference.tif") as one, open_raster(folder / "input.tif") as two:
         pair = make_pair(Image(one), Image(two), search_radius_m=500.0)
@@ -131,7 +131,7 @@ def test_its_mask_covers_the_lines_and_their_surroundings_alone(
     mask = masked(tmp_path, looked_at(tmp_path, *map(drawn_into, plain), context))
     drawn = drawn_into(np.zeros((SIDE, SIDE)))[:200, 20:220] > 0
     assert mask[drawn].mean() > 0.99
-    # Windows of 9 pixels that reach the rows 40 to 43 and 110 to 113, or such columns, end here.
+    # No window of 9 pixels in this area reaches the rows 40 to 43 or 110 to 113, or such columns.
     assert mask[52:102, 32:82].mean() < 0.5
 
 
@@ -141,7 +141,7 @@ def test_its_mask_covers_the_lines_and_their_surroundings_alone(
 def test_lines_are_masked_in_any_colour_over_any_ground(
     tmp_path: Path, context: Context, colours: tuple[float, float], width: int
 ) -> None:
-    """Where the reference shows nothing else, a tenth as strong."""
+    """The lines are a tenth as strong where the reference shows nothing else."""
     images = [sensed(1), sensed(2, place=9)]
     images[0][:, :160] *= 0.05
     for image, colour, faint in zip(images, colours, (0.1, 1.0), strict=True):
@@ -159,7 +159,7 @@ def test_lines_are_masked_in_any_colour_over_any_ground(
 def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
     tmp_path: Path, context: Context
 ) -> None:
-    """Where speckle hides how sharp their edges are."""
+    """Speckle hides how sharp their edges are."""
     tile = np.searchsorted((45, 130, 240), np.arange(SIDE), side="right") % 2
     gains = np.where(tile, 0.6, 1.2) * np.where(tile, 0.6, 1.2)[:, None]
     reference, input = (
@@ -172,13 +172,13 @@ def test_tiles_of_a_mosaic_are_found_in_speckle_and_their_seams_masked(
     assert locked is not None and locked.shared.is_evident
     assert not locked.shared.sameness.has_sharp_edges and locked.shared.sameness.has_seams
     mask = masked(tmp_path, locked)
-    # Columns are counted from 20 on.
+    # Columns count from 20.
     assert mask[:, 104:116].mean() > 0.9 and mask[124:136].mean() > 0.9
 
 
 @pytest.mark.slow
 def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> None:
-    """Beside a line, windows vary alike no more where the ground varies as much as the line."""
+    """Windows beside a line no longer vary alike if the ground varies as much as the line."""
     reference, input = (drawn_into(3 * sensed(n, place=place)) for n, place in ((1, 1), (2, 9)))
     mask = masked(tmp_path, looked_at(tmp_path, reference, input, context))
     assert mask[39:45].mean() > 0.9
@@ -189,7 +189,7 @@ def test_edges_of_what_is_drawn_are_masked(tmp_path: Path, context: Context) -> 
 def test_views_without_anything_drawn_have_none(
     tmp_path: Path, context: Context, place: int
 ) -> None:
-    """Noise blurs the edges of different sensors' views."""
+    """Noise blurs the edges in views of different sensors."""
     locked = looked_at(tmp_path, sensed(1, 0.8), -sensed(2, 0.8, place), context)
     assert locked is not None and not locked.shared.sameness.is_evident
 
@@ -202,14 +202,14 @@ def test_views_without_anything_drawn_have_none(
 def test_a_transform_to_whole_pixels_is_evidence_itself(
     tmp_path: Path, context: Context, off_m: float, exact_px: float, is_evident: bool
 ) -> None:
-    """Pixels of 10 m. Few of two sensors' views of one ground match so exactly; poses to 0.2."""
+    """Two sensors' views of one ground rarely match so exactly; pixels of 10 m, poses to 0.2."""
     images = sensed(1, 0.8), -sensed(2, 0.8, 9)
     locked = looked_at(tmp_path, *images, context, shift_on_map(70.0 + off_m, -30.0), exact_px)
     assert locked is not None
     assert lies_at(locked, (7 if is_evident else 7 + off_m / 10, 3))
     assert not locked.shared.sameness.is_evident
     assert locked.shared.is_evident == is_evident
-    # What is masked then is around edges, whatever they look like.
+    # The mask then surrounds edges, whatever they look like.
     assert (masked(tmp_path, locked).mean() > 0.1) == is_evident
 
 
@@ -217,7 +217,7 @@ def test_a_transform_to_whole_pixels_is_evidence_itself(
 def test_clouds_in_other_colours_are_masked_where_the_transform_is_evidence(
     tmp_path: Path, context: Context
 ) -> None:
-    """Nothing of them is the same, and soft ones have few edges."""
+    """No part of them is the same, and soft clouds have few edges."""
     clouds = 3 * texture(SIDE, SIDE, 30)
     images = sensed(1) + clouds, sensed(2, place=9) - clouds
     locked = looked_at(tmp_path, *images, context)
@@ -241,7 +241,7 @@ def test_clouds_in_other_colours_are_masked_where_the_transform_is_evidence(
 def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
     tmp_path: Path, context: Context, sensors: Sensors, place: int, off_m: float, is_exact: bool
 ) -> None:
-    """Pixels of 10 m. Radar images of one ground vary alike where speckle has averaged out."""
+    """Radar images of one ground vary alike where speckle averages out; pixels of 10 m."""
     images, model = (sensed(1, 0.8), sensed(2, 0.8, place)), shift_on_map(off_m, 0.0)
     locked = looked_at(tmp_path, *images, context, model, sensors=sensors)
     assert locked is not None and locked.shared.is_exact == is_exact
@@ -250,7 +250,7 @@ def test_radar_images_are_as_if_on_whole_pixels_unless_they_vary_as_one_ground(
 
 @pytest.mark.slow
 def test_one_sensors_views_of_one_ground_are_explained(tmp_path: Path, context: Context) -> None:
-    """Most windows vary alike; so do those of reduced images where single pixels do not."""
+    """Most windows vary alike; where single pixels do not, windows of reduced images do."""
     locked = looked_at(tmp_path, sensed(1, 0.15), sensed(2, 0.15), context)
     assert locked is not None and locked.shared.sameness.area > 0.5
     assert locked.shared.is_explained
@@ -287,11 +287,11 @@ def test_a_copy_is_explained_of_one_kind_of_sensor(tmp_path: Path, context: Cont
 
 @pytest.mark.slow
 def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) -> None:
-    """Its edges are as sharp as a drawing's, but everywhere."""
+    """Its edges are as sharp as those of a drawing, but lie everywhere."""
     copy = looked_at(tmp_path, sensed(1, 0.1), -1.5 * sensed(2, 0.1), context)
     assert copy is not None and copy.shared.sameness.sharpness > 5
     assert not copy.shared.is_drawn
-    # All of it follows in other colours, and must not be hidden; edges are.
+    # All of it corresponds in other colours and must not be hidden; only edges are.
     assert copy.shared.is_exact and masked(tmp_path, copy).mean() < 0.95
     drawn = drawn_into(sensed(1)), -drawn_into(sensed(2, place=9))
     locked = looked_at(tmp_path, *drawn, context)
@@ -303,7 +303,7 @@ def test_a_copy_in_other_colours_is_not_drawn(tmp_path: Path, context: Context) 
 def test_one_pattern_of_noise_over_different_ground_is_found(
     tmp_path: Path, context: Context, blur_px: float, strength: float
 ) -> None:
-    """It may be correlated, so that as much is the same in images reduced by 4."""
+    """Correlated noise agrees as much in images reduced by 4."""
     noise = np.random.default_rng(5).normal(size=(SIDE, SIDE))
     pattern = cv2.GaussianBlur(noise, (0, 0), blur_px)
     pattern *= strength / pattern.std()
@@ -314,7 +314,7 @@ def test_one_pattern_of_noise_over_different_ground_is_found(
 
 
 def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Context) -> None:
-    """It is left in reduced images, too, but less than in the images."""
+    """It persists in reduced images, but less than at full resolution."""
     rng = np.random.default_rng(6)
     pattern = 0.6 * rng.normal(size=(SIDE, SIDE))
     pattern += rng.normal(size=(SIDE, 1)) + rng.normal(size=(1, SIDE))
@@ -326,7 +326,7 @@ def test_a_pattern_of_rows_and_columns_is_no_ground(tmp_path: Path, context: Con
 
 
 def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -> None:
-    """They have no gradients but at their edges, where the ground differs."""
+    """Holes have gradients only at their edges, where the ground differs."""
     holes = cv2.GaussianBlur(texture(SIDE, SIDE, 5), (0, 0), 12.0) > 0
     speckled = (np.random.default_rng(n).exponential(3.0, holes.shape) for n in (1, 2))
     reference, input = (np.where(holes, -3.0, values) for values in speckled)
@@ -340,7 +340,7 @@ def test_the_same_holes_are_found_in_speckle(tmp_path: Path, context: Context) -
 def on_grids(
     folder: Path, reference: np.ndarray, input: np.ndarray, place: Affine
 ) -> Iterator[ImagePair]:
-    """Yield two arrays as a pair, the second with a geotransform of its own."""
+    """Yield two arrays as a pair, the second with its own geotransform."""
     grid = utm_grid(SIDE, SIDE)
     own = grid.on_same_map(place, input.shape[1], input.shape[0])
     paths = [
@@ -352,7 +352,7 @@ def on_grids(
 
 
 def found_in(pair: ImagePair, model: Model, context: Context) -> LockedContent | None:
-    """Look for content that two cameras' images have in common under a model."""
+    """Search two camera images for common content under a model."""
     transform = Transform(model, pair.grid.crs, pair.input.source.grid)
     places = survey_places(pair.grid)
     return find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context)
@@ -364,10 +364,10 @@ def found_in(pair: ImagePair, model: Model, context: Context) -> LockedContent |
 def test_lines_that_are_drawn_on_the_map_are_found_on_another_grid(
     tmp_path: Path, context: Context, side_m: float, offset: tuple[int, int]
 ) -> None:
-    """The other grid has pixels of 8 m, or of 10 m as the reference, and starts 4 m beside it.
+    """The other grid has pixels of 8 m, or of 10 m as the reference, and is offset by 4 m.
 
-    The lines may lie beside their place of the map. That a transform is the nominal one, or a
-    shift, is no evidence: the ground may lie there, too.
+    The lines may be displaced on the map. A nominal transform or a shift is no evidence here: the
+    ground may lie there, too.
     """
     grid, factor = utm_grid(SIDE, SIDE), side_m / 10.0
     reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9), offset)
@@ -390,7 +390,7 @@ def test_lines_at_the_same_columns_and_rows_are_found_whatever_pixels_are_nomina
     grid, factor = utm_grid(SIDE, SIDE), 1.02
     reference, input = drawn_into(sensed(1)), drawn_into(sensed(2, place=9))
     place = compose(grid.transform, Affine.scale(factor))
-    # The reference's map to the input's, x and y from the common corner.
+    # From the reference's map to the input's, x and y from the common corner.
     corner = np.array([grid.transform.c, grid.transform.f])
     stretched = PolynomialModel(
         "affine",
@@ -422,7 +422,7 @@ def test_arrays_are_not_the_same_where_a_transform_has_them_elsewhere(
 
 
 class OfASensor(Grid):
-    """The pixels of an image in the geometry of its sensor."""
+    """The pixels of an image in sensor geometry."""
 
 
 def test_nothing_is_drawn_on_the_map_of_an_image_of_a_sensor(

@@ -1,4 +1,4 @@
-"""Parts are found by what chips show together, not by single peaks."""
+"""Parts are found by the joint evidence of chips, not by single peaks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def raised(surfaces: np.ndarray, chips: np.ndarray, shift: tuple[int, int], by: 
 
 
 def highest_of_noise() -> float:
-    """Return how high noise is within 2 px on average: the highest of 13."""
+    """Return the mean height of noise within 2 px: the highest of 13 values."""
     return float(np.random.default_rng(1).normal(size=(10_000, 13)).max(axis=1).mean())
 
 
@@ -40,7 +40,7 @@ def test_noise_has_no_part(seed: int) -> None:
     ("lower", "left", "where"), [(3, 7, "lower"), (0, 3, "left"), (2, 4, "lower left")]
 )
 def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, where: str) -> None:
-    """Each chip is raised by less than noise is high somewhere; together they are evident."""
+    """Each chip is raised by less than the highest noise; together they are evident."""
     surfaces = noise()
     inside = (CENTRES[:, 1] // 50 >= lower) & (CENTRES[:, 0] // 50 < left)
     by = 4.3
@@ -52,9 +52,9 @@ def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, 
     assert part.where == where
     members = set(np.flatnonzero(inside).tolist())
     assert len(set(part.members) - members) <= 1
-    # One chip in six has noise where the model has it that leaves it less than half the mean.
+    # In one chip of six, noise at the model's place leaves it less than half the mean.
     assert len(members - set(part.members)) <= inside.sum() / 3
-    # All but one confirm it: their sum, over the square root of n, is as high as one by that root.
+    # All but one confirm it: their sum over √n is √n times as high as one of them.
     confirming = inside.sum() - 1
     assert part.excess == pytest.approx((by - highest_of_noise()) * np.sqrt(confirming), rel=0.3)
 
@@ -69,7 +69,7 @@ def test_two_parts_share_no_chip() -> None:
 
 
 def test_what_the_model_has_is_no_part() -> None:
-    """Buildings match elsewhere, too, among as much that matches where the model has it."""
+    """Buildings match elsewhere, too, but about as much matches at the model's place."""
     surfaces = noise()
     raised(surfaces, CENTRES[:, 0] < 150, (9, -6), 5.0)
     raised(surfaces, CENTRES[:, 0] < 150, (0, 0), 5.0)
@@ -112,7 +112,7 @@ def test_tiles_are_parts_wherever_they_lie() -> None:
 
 
 def test_scattered_chips_are_no_part() -> None:
-    """Canopies are displaced all over a scene, wherever a chip holds little else."""
+    """Canopies are displaced all over a scene, where they fill most of a chip."""
     surfaces = noise()
     col, row = (CENTRES // 50).T
     raised(surfaces, (col % 2 == 0) & (row % 2 == 0), (9, -6), 6.0)
@@ -125,7 +125,7 @@ def test_scattered_chips_are_no_part() -> None:
 def test_few_chips_that_are_highest_farther_off_are_no_part(
     right: int, rows: int, found: int
 ) -> None:
-    """Canopies of 30 m are displaced so far, and their peaks reach nearer: 4 of 42 chips, or 6."""
+    """Canopies of 30 m are displaced so far, and their peaks extend nearer: 4 of 42 chips, or 6."""
     surfaces = noise()
     at = np.arange(-RADIUS, RADIUS + 1)
     peak = 12 * np.exp(-((at - right) ** 2 + at[:, None] ** 2) / 18)
@@ -135,7 +135,7 @@ def test_few_chips_that_are_highest_farther_off_are_no_part(
 
 @pytest.mark.parametrize("seed", range(5))
 def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
-    """Of all five sets of three chips or more of four, by trying each."""
+    """Tried exhaustively: all five sets of at least three of four chips."""
     four = np.flatnonzero((CENTRES < 100).all(axis=1))
     off = np.hypot(*np.meshgrid(*2 * [np.arange(-RADIUS, RADIUS + 1)]))
     surfaces = np.where(off <= 20, np.minimum(2 * noise(seed)[four], 7.0), -9.0)

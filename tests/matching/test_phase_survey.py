@@ -21,7 +21,7 @@ SIDE, MARGIN = 400, 30
 
 
 def place(seed: int, right: int = 0, down: int = 0) -> np.ndarray:
-    """Return a place whose ground is moved by whole pixels."""
+    """Return a place with its ground displaced by whole pixels."""
     canvas = texture(SIDE + 2 * MARGIN, SIDE + 2 * MARGIN, seed)
     top, left = MARGIN - down, MARGIN - right
     return canvas[top : top + SIDE, left : left + SIDE]
@@ -30,7 +30,7 @@ def place(seed: int, right: int = 0, down: int = 0) -> np.ndarray:
 def survey_of(
     folder: Path, reference: np.ndarray, input: np.ndarray, context: Context, noise: float = 0.1
 ) -> Survey:
-    """Return what two arrays that are laid on one another show, and which noise each has."""
+    """Return the survey of two superimposed arrays with independent noise."""
     rng, paths = np.random.default_rng(1), []
     for name, values in (("reference", reference), ("input", input)):
         noisy = 2000 + 200 * (values + noise * rng.normal(size=values.shape))
@@ -66,7 +66,7 @@ def test_what_changed_is_at_no_place_elsewhere(
 
 
 def test_of_a_copy_nothing_is_left_though_it_repeats(tmp_path: Path, context: Context) -> None:
-    """Tiles of 20 px, mirrored: rounding is no ground."""
+    """Mirrored tiles of 20 px: the rest is rounding, not ground."""
     tile = texture(20, 20, 4)
     both = np.concatenate([tile, tile[:, ::-1]], axis=1)
     scene = np.tile(both, (SIDE // 20, SIDE // 40))
@@ -75,7 +75,7 @@ def test_of_a_copy_nothing_is_left_though_it_repeats(tmp_path: Path, context: Co
 
 
 def test_an_orchard_that_repeats_is_at_no_place_elsewhere(tmp_path: Path, context: Context) -> None:
-    """Trees every 14 px in both images, which have noise of their own."""
+    """Trees every 14 px in both images, which have independent noise."""
     rows, cols = np.indices((SIDE, SIDE))
     trees = 2 * (np.cos(2 * np.pi * rows / 14) + np.cos(2 * np.pi * cols / 14))
     found = survey_of(tmp_path, *2 * [place(4) + trees], context, noise=0.5)

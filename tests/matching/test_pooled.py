@@ -48,7 +48,7 @@ def stretched() -> Model:
 def masked(
     folder: Path, model: Model, masks: np.ndarray, input: bool = False, **more: int
 ) -> Iterator[tuple[ImagePair, Model]]:
-    """Open a pair of which a mask on one image takes part."""
+    """Open a pair with a mask on one of its images."""
     files = write_textured_pair(folder, SIZE, model, **more)
     path = write_raster(folder / "mask.tif", masks, files.grid)
     with files.opened() as pair, open_raster(path) as mask:
@@ -75,7 +75,7 @@ def checked(pair: ImagePair, model: Model, context: Context) -> Check:
 
 
 def with_colour(pair: ImagePair, folder: Path) -> ImagePair:
-    """Return a pair whose input shows its texture by colour alone: the mean band is constant."""
+    """Return a pair whose input shows its texture only in colour: the mean band is constant."""
     values = pair.input.source.read(pair.input.source.window)[0]
     bands = np.stack([values, np.full_like(values, 2000), 4000 - values])
     path = write_raster(folder / "colour.tif", bands, pair.input.source.grid)
@@ -136,7 +136,7 @@ def test_check_points_that_lie_elsewhere_show_it(tmp_path: Path, context: Contex
 
 @pytest.mark.slow
 def test_a_pyramid_leads_down_to_the_ground(tmp_path: Path, context: Context) -> None:
-    """The coarse search is at pixels three times as large, of roads three times as wide."""
+    """The coarse search uses pixels three times as large, and roads three times as wide."""
     size = (1600, 500)
     model = shift_on_map(110.0, -70.0)
     files = write_textured_pair(tmp_path, size, model)
@@ -181,7 +181,7 @@ def test_tiles_cover_the_grid_side_by_side() -> None:
 
 
 def test_neighbours_are_added_by_their_weights() -> None:
-    """At a corner of a lattice of chips there are four, in its middle nine."""
+    """A chip in the corner of the lattice sums four chips, one in its middle nine."""
     random = np.random.default_rng(4)
     centres = np.stack(np.meshgrid(*[np.arange(5) * 61 + 30] * 2), -1).reshape(-1, 2)
     forward, backward = random.normal(size=(2, 25, 9, 9)).astype(np.float32)
@@ -193,12 +193,12 @@ def test_neighbours_are_added_by_their_weights() -> None:
         assert found.weight[chip] == pytest.approx(weight[members].sum())
         for own, added in ((forward, found.forward), (backward, found.backward)):
             total = sum(weight[i] * own[i] for i in members)
-            # Surfaces are normalised: in robust standard deviations, so by a factor and an offset.
+            # Normalising surfaces to robust standard deviations is a gain and an offset.
             assert np.corrcoef(total.ravel(), added[chip].ravel())[0, 1] > 0.99999
 
 
 def test_neighbours_show_what_single_chips_do_not() -> None:
-    """Peaks of two standard deviations are lost in noise; of nine chips, they are six."""
+    """Peaks of two standard deviations are lost in noise; with nine chips, they reach six."""
     random = np.random.default_rng(5)
     centres = np.stack(np.meshgrid(*[np.arange(9) * 61 + 30] * 2), -1).reshape(-1, 2)
     surfaces = random.normal(size=(81, 21, 21)).astype(np.float32)

@@ -23,9 +23,9 @@ TRUTH = Pose(50.0, 1.1, (4.0, -6.0))
 def surveyed(
     folder: Path, pose: Pose, context: Context, moved: tuple[int, int] = (0, 0), **more: int
 ) -> PoseSurvey:
-    """Survey a pair whose true pose is `TRUTH` around a pose; the last rows of the input moved.
+    """Survey around a pose a pair whose true pose is `TRUTH`; the input's last rows are displaced.
 
-    `moved` is how many rows, and by how many columns.
+    `moved` gives the number of rows and their displacement in columns.
     """
     with ExitStack() as stack:
         images, turned = [], turned_pair(TRUTH, (250, 250), (260, 260), **more)
@@ -40,7 +40,7 @@ def surveyed(
         return survey_pose(pair, windows.transform(pose), 0.02, Sensors.RADARS, None, context)
 
 
-# How accurate a pose is to be, and what it may be wrong by.
+# The true pose, and one with a tolerable error.
 @pytest.mark.slow
 @pytest.mark.parametrize("pose", [TRUTH, replace(TRUTH, rotation_deg=51.5)])
 def test_chips_confirm_a_pose(pose: Pose, tmp_path: Path, context: Context) -> None:
@@ -71,7 +71,7 @@ def test_chips_confirm_no_wrong_pose(
 
 @pytest.mark.slow
 def test_a_strip_that_moved_is_found_by_smaller_chips(tmp_path: Path, context: Context) -> None:
-    """It is too narrow for three chips of those that confirm the pose."""
+    """The strip is too narrow for three of the chips that confirm the pose."""
     surveys = surveyed(tmp_path, TRUTH, context, moved=(50, 10)).surveys
     assert surveys.whole is not None and surveys.whole.parts == []
     (part,) = surveys.parts

@@ -1,4 +1,4 @@
-"""The way down the pyramid."""
+"""The search from coarse to fine pyramid levels."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_from_the_coarse_shift_to_a_model(
 def test_a_radius_larger_than_the_scene_is_no_more_work_than_the_scene(
     textured: TexturedPair, pair: ImagePair, context: Context
 ) -> None:
-    """A thousand kilometres: beyond the scene's size nothing is left to compare."""
+    """A thousand kilometres: beyond the scene's size there is nothing left to compare."""
     model = coarse_model(pair, 1e6, context)
     assert error_m(model, textured) < 10
 
@@ -67,6 +67,6 @@ def test_cancelling(pair: ImagePair, context: Context) -> None:
 def test_two_places_are_not_found_in_each_other(
     other_place: TexturedPair, context: Context
 ) -> None:
-    """Or what is found is no better than chance, which the verdict judges."""
+    """Any transform that is found is no better than chance, which the verdict judges."""
     with other_place.opened() as pair, pytest.raises(NothingFoundError):
         coarse_model(pair, 200.0, context)

@@ -25,7 +25,7 @@ SIZE_PX = 360
 
 
 def coarse_shift_px(folder: Path, values: np.ndarray, radius_m: float) -> np.ndarray:
-    """Return the shift (x, y) found between values and their negative, cut out 9 px further."""
+    """Return the shift (x, y) found between values and their negative, cropped 9 px further on."""
     noise = np.random.default_rng(3).normal(scale=0.2, size=values.shape)
     reference = (1000 + 200 * (values + noise))[:SIZE_PX, :SIZE_PX]
     input = (1000 - 200 * values)[9 : SIZE_PX + 9, 9 : SIZE_PX + 9]
@@ -46,7 +46,7 @@ def coarse_shift_px(folder: Path, values: np.ndarray, radius_m: float) -> np.nda
 
 
 def tiled() -> np.ndarray:
-    # The tile goes on smoothly into itself: it is a texture on a torus.
+    # The tile continues smoothly into itself: it is a texture on a torus.
     spectrum = np.fft.fft2(texture(PERIOD_PX, PERIOD_PX, 4))
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(PERIOD_PX)] * 2))
     tile = np.fft.ifft2(spectrum * np.exp(-((frequency / 0.15) ** 2))).real

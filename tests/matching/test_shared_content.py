@@ -1,4 +1,4 @@
-"""What images share: whether it is one ground, a copy, or something drawn."""
+"""Content that two images share: one ground, a copy, or something drawn."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from groundtie.matching.shared_content import Sensors, SharedContent
 from groundtie.similarity.in_common import VIEW_SHARPNESS, Sameness
 
-# Shares that are the same of one sensor's views: the more, the coarser the pixels.
+# Shares that agree in one sensor's views; they grow with coarser pixels.
 ONE_GROUND = Sameness(sharpness=1.5, area=0.4, reduced_area=0.7, coarse_area=0.8, ground=0.4)
 
 
@@ -19,13 +19,13 @@ ONE_GROUND = Sameness(sharpness=1.5, area=0.4, reduced_area=0.7, coarse_area=0.8
 def test_ground_varies_alike_or_follows_in_other_colours(
     ground: float, related: float, is_ground: bool
 ) -> None:
-    """As of a negative, of which nothing varies alike."""
+    """The latter as in a negative, in which nothing varies alike."""
     assert Sameness(1.0, 0.1, 0.2, 0.3, ground, related).varies_as_ground == is_ground
 
 
 @pytest.mark.parametrize(("coarse", "is_view"), [(0.66, True), (0.6, False)])
 def test_views_are_a_little_less_alike_in_coarser_pixels(coarse: float, is_view: bool) -> None:
-    """Light and seasons differ over wide areas; two radar images have neither."""
+    """Illumination and seasons differ over wide areas, but not for two radar images."""
     sameness = replace(ONE_GROUND, coarse_area=coarse)
     assert SharedContent(sameness, Sensors.CAMERAS).is_explained == is_view
     assert sameness.is_finer_than_ground and not sameness.varies_as_ground
@@ -33,7 +33,7 @@ def test_views_are_a_little_less_alike_in_coarser_pixels(coarse: float, is_view:
 
 @pytest.mark.parametrize("sensors", Sensors)
 def test_what_varies_alike_in_two_radar_images_is_no_ground(sensors: Sensors) -> None:
-    """Each view of a radar has speckle of its own."""
+    """Each radar image has independent speckle."""
     assert SharedContent(ONE_GROUND, sensors).is_explained == (sensors is Sensors.CAMERAS)
 
 
@@ -52,7 +52,7 @@ def test_what_varies_alike_in_two_radar_images_is_no_ground(sensors: Sensors) ->
 def test_one_ground_in_pixels_of_many_looks_is_nothing_drawn(
     shares: dict[str, float], is_evident: bool
 ) -> None:
-    """But it is where it moves so, if hardly anything is left, and of two sensors' views."""
+    """It is if it moves as drawn content, leaves hardly anything else, or is of two sensors."""
     sameness = replace(ONE_GROUND, **shares)
     assert sameness.is_evident
     assert SharedContent(sameness, Sensors.RADARS, off_drawn=1.1).is_evident == is_evident
@@ -61,7 +61,7 @@ def test_one_ground_in_pixels_of_many_looks_is_nothing_drawn(
 
 
 def test_edges_sharper_than_those_of_bands_are_no_views_of_one_ground() -> None:
-    # As of one exposure's bands.
+    # As for bands of one exposure.
     views = replace(ONE_GROUND, sharpness=4.2)
     assert views.is_view
     assert not replace(views, sharpness=VIEW_SHARPNESS).is_view
@@ -115,7 +115,7 @@ def test_a_little_that_is_the_same_may_be_drawn_unless_it_is_a_moved_view(
 
 
 def test_copies_may_hide_ground_wherever_they_lie() -> None:
-    """A part of the other image may be another place, of which they leave little."""
+    """A part of the other image may be another place, of which copies leave little."""
     copy = Sameness(sharpness=8.0, area=0.8, reduced_area=0.8, coarse_area=0.8, ground=0.2)
     shared = SharedContent(copy, Sensors.CAMERAS, off_drawn=1.1)
     assert copy.is_copy and shared.is_explained and shared.may_hide_ground
@@ -144,7 +144,7 @@ def test_radar_images_of_one_ground_lie_near_whole_pixels_by_chance(
 def test_cameras_images_are_alike_in_coarse_pixels(
     reduced: float, coarse: float, is_of_cameras: bool
 ) -> None:
-    """As a radar's and a camera's are not, with or without speckle."""
+    """Images of a radar and a camera are not, with or without speckle."""
     sameness = replace(ONE_GROUND, ground=0.1, reduced_area=reduced, coarse_area=coarse)
     assert SharedContent(sameness, Sensors.CAMERAS).is_of_cameras == is_of_cameras
     assert not SharedContent(sameness, Sensors.DIFFERENT).is_of_cameras

@@ -23,7 +23,7 @@ from groundtie.similarity.surface import SimilaritySettings
 
 SETTINGS = SimilaritySettings("orientation")
 
-# Off by three pixels along each axis, as a coarse model may be.
+# Wrong by three pixels along each axis, as a coarse model may be.
 COARSE = shift_on_map(40.0, -15.0)
 
 
@@ -48,7 +48,7 @@ def test_every_model_is_fitted_from_a_coarse_one(
     assert error_px(model, textured) < (0.5 if kind == "tps" else 0.2)
     assert not estimate.points.is_check.any()
     assert len(estimate.fold_models) >= 4
-    # Folds are in pixels of the matching grid: the input lies 7 columns and 4.5 rows further.
+    # Folds are in pixels of the matching grid: the input lies 7 columns and 4.5 rows further on.
     at = np.array([[130.0, 120.0]])
     for fold in estimate.fold_models:
         assert np.abs(fold(at) - at - [7.0, 4.5]).max() < 0.7
@@ -67,7 +67,7 @@ def test_tie_points_are_places_in_both_images(
     assert {tuple(p) for p in np.rint(px).astype(int)} <= {tuple(c) for c in fit.layout.fit_centres}
     errors = right.input_px - textured.truth(right.reference_xy)
     assert rms(errors) < 0.5
-    # What the surfaces indicate of their peaks' scatter is neither far too bold nor far too modest.
+    # The scatter estimated from the surfaces is neither far too small nor far too large.
     estimated = np.sqrt(np.trace(right.covariance_px2, axis1=1, axis2=2).mean())
     assert 0.3 < estimated / rms(errors) < 6
     assert (right.forward_backward_error_px <= 2.0).all()
@@ -111,7 +111,7 @@ def test_too_few_chips_with_content(
 def test_the_model_reaches_the_input_through_its_own_georeferencing(
     tmp_path: Path, context: Context
 ) -> None:
-    """An input of larger pixels: positions count in its own pixels, not in matching ones."""
+    """An input with larger pixels: positions are in its own pixels, not in matching ones."""
     files = write_textured_pair(tmp_path, (420, 400), shift_on_map(50, 30), input_pixel_ratio=2.0)
     with files.opened() as pair:
         estimate = fit_of(pair).estimate(shift_on_map(20, 10), "translation", context)

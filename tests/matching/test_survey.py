@@ -36,7 +36,7 @@ def surveyed(
     context: Context,
     **masks: np.ndarray,
 ) -> Survey:
-    """Survey two arrays of one place around the transform that nothing moves."""
+    """Survey two arrays of one place around the identity."""
     paths = [
         write_raster(folder / f"{name}.tif", (1000 + 200 * values).astype(np.uint16))
         for name, values in (("reference", reference), ("input", input))
@@ -55,7 +55,7 @@ def surveyed(
 
 
 def place(shift: tuple[int, int] = (0, 0), seed: int = 0) -> np.ndarray:
-    """Return a place that is moved by a shift (x, y)."""
+    """Return a place displaced by a shift (x, y)."""
     canvas = texture(SIDE + 2 * MARGIN, SIDE + 2 * MARGIN, seed)
     top, left = MARGIN - shift[1], MARGIN - shift[0]
     return canvas[top : top + SIDE, left : left + SIDE]
@@ -120,7 +120,7 @@ def test_a_part_beyond_the_radius_is_no_part(tmp_path: Path, context: Context) -
 
 @pytest.mark.slow
 def test_scattered_disagreement_is_no_part(tmp_path: Path, context: Context) -> None:
-    """Every other chip shows another place, each its own."""
+    """Every other chip shows a place of its own."""
     input = noisy(place(), 2)
     for number, (row, col) in enumerate(np.argwhere(np.indices((7, 7)).sum(axis=0) % 2)):
         where = np.s_[row * 48 : row * 48 + 48, col * 48 : col * 48 + 48]
@@ -141,7 +141,7 @@ def test_what_repeats_matches_elsewhere_about_as_well(tmp_path: Path, context: C
 def test_ground_beneath_what_is_drawn_is_a_second_peak(
     by_px: tuple[int, int], tmp_path: Path, context: Context
 ) -> None:
-    """What is drawn matches where the model has it, in strong contrast; the ground elsewhere."""
+    """The drawn content matches at the model's place, in strong contrast; the ground elsewhere."""
     drawn = 1.2 * place(seed=5)
     views = drawn + place(), drawn + place(by_px)
     survey = surveyed(tmp_path, noisy(views[0], 1), noisy(views[1], 2), context)
@@ -154,7 +154,7 @@ def test_ground_beneath_what_is_drawn_is_a_second_peak(
 
 
 def test_what_is_similar_because_it_lies_near_is_no_second_peak() -> None:
-    """A wide peak is high where a rival may lie, too: no higher than all around it, but once."""
+    """A wide peak is high at a rival's place, too, but no higher than its surroundings."""
     span = np.arange(-SURVEY_RADIUS_PX, SURVEY_RADIUS_PX + 1)
     distance = np.hypot(*np.meshgrid(span, span))
     wide = np.repeat(10 * np.exp(-(distance[None] ** 2) / 200), 9, axis=0).astype(np.float32)
@@ -168,7 +168,7 @@ def test_what_is_similar_because_it_lies_near_is_no_second_peak() -> None:
 def test_one_chip_counts_for_so_much_at_most_of_a_second_peak(
     height: float, counted: float
 ) -> None:
-    """A few canopies are higher than all of a scene whose ground lies elsewhere."""
+    """A few canopies are higher than a whole scene whose ground is displaced."""
     surfaces = np.zeros((9, 2 * SURVEY_RADIUS_PX + 1, 2 * SURVEY_RADIUS_PX + 1), np.float32)
     surfaces[:, SURVEY_RADIUS_PX, SURVEY_RADIUS_PX] = 50.0
     surfaces[:2, SURVEY_RADIUS_PX - 6, SURVEY_RADIUS_PX + 8] = height

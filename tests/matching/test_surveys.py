@@ -32,7 +32,7 @@ SIDE, MARGIN = 340, 30
 
 
 def place(shift: tuple[int, int] = (0, 0)) -> np.ndarray:
-    """Return a place that is moved by a shift (x, y)."""
+    """Return a place displaced by a shift (x, y)."""
     canvas = texture(SIDE + 2 * MARGIN, SIDE + 2 * MARGIN, 4)
     top, left = MARGIN - shift[1], MARGIN - shift[0]
     return canvas[top : top + SIDE, left : left + SIDE]
@@ -43,18 +43,18 @@ def noisy(values: np.ndarray, seed: int, deviation: float | np.ndarray = 0.2) ->
 
 
 def zoomed(values: np.ndarray, factor: int) -> np.ndarray:
-    """Return an image in pixels that are so many times smaller."""
+    """Return an image in pixels that are smaller by a factor."""
     return np.kron(values, np.ones((factor, factor)))
 
 
 def zoomed_out(values: np.ndarray, factor: int) -> np.ndarray:
-    """Return an image in pixels that are so many times larger: means."""
+    """Return an image in pixels that are larger by a factor: block means."""
     rows, cols = (side // factor for side in values.shape)
     return values.reshape(rows, factor, cols, factor).mean(axis=(1, 3))
 
 
 def rest_of(*pair: Any, **more: Any) -> Rest | None:
-    """Return what two arrays leave; parameters as `surveys_of`."""
+    """Return the rest of two arrays; parameters as in `surveys_of`."""
     return surveys_of(*pair, **more).rest
 
 
@@ -66,7 +66,7 @@ def surveys_of(
     offset: tuple[float, float] = (0.0, 0.0),
     sensors: Sensors = Sensors.CAMERAS,
 ) -> Surveys:
-    """Return what chips show of two arrays whose rows and columns are an offset apart."""
+    """Return the surveys of two arrays whose rows and columns are displaced by an offset."""
     paths = [
         write_raster(
             folder / f"{name}.tif", (2000 + 200 * values).astype(np.uint16), utm_grid(SIDE, SIDE)
@@ -129,7 +129,7 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
 
 
 def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context: Context) -> None:
-    """Most of both images is the same, with sharp rims, over two places."""
+    """Most of both images is the same clouds, with sharp rims, over two places."""
     clouds = texture(SIDE, SIDE, 30) > -1.2
     images = [
         np.where(clouds, 4 + 0.5 * place(), ground)
@@ -142,7 +142,7 @@ def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context:
 def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
     tmp_path: Path, context: Context
 ) -> None:
-    """Half a pixel apart, edges do not coincide sharply."""
+    """Edges half a pixel apart do not coincide sharply."""
     other = (place() + place((1, 0))) / 2
     rest = rest_of(tmp_path, noisy(place(), 1), noisy(other, 2), context)
     assert rest is not None and rest.shared.is_explained and rest.survey is None
@@ -153,7 +153,7 @@ def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
 def test_views_with_edges_as_sharp_as_drawn_ones_are_taken_for_such_at_whole_pixels(
     offset: tuple[float, float], is_drawn: bool, tmp_path: Path, context: Context
 ) -> None:
-    """Fields; half are seen through haze, alike in coarser pixels alone, so that none is a copy."""
+    """Fields; half are under haze and alike only in coarser pixels, so that none is a copy."""
     fine, noise = zoomed(np.round(place()), 5), np.where(np.arange(SIDE) < SIDE // 2, 0.1, 1.2)
     reference, input = (
         zoomed_out(ndimage.shift(fine, np.multiply(5, by), mode="mirror", order=1), 5)
@@ -181,7 +181,7 @@ def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) ->
 def test_what_two_radar_images_have_not_in_common_shows_where_a_part_lies(
     moved_rows: int, is_elsewhere: bool, tmp_path: Path, context: Context
 ) -> None:
-    """What they have in common is too little to be drawn, and is taken out all the same."""
+    """Their common content is too little to be drawn, but is removed all the same."""
     reference, offset = place(), (0.4, -0.3)
     input = place()
     input[:moved_rows] = place((11, -7))[:moved_rows]
@@ -198,7 +198,7 @@ def test_what_two_radar_images_have_not_in_common_shows_where_a_part_lies(
 def test_what_two_sensors_have_in_common_is_looked_behind(
     is_one_place: bool, tmp_path: Path, context: Context
 ) -> None:
-    """Soft blots over a fifth: beneath them one place in other contrast, or another one."""
+    """Soft blots over a fifth; beneath them one place in inverted contrast, or another place."""
     offset = 0.4, -0.3
     blots = 4 * ndimage.gaussian_filter((texture(SIDE, SIDE, 30) > 0.9).astype(float), 3)
     ground = -place() if is_one_place else place()[::-1]
@@ -207,6 +207,6 @@ def test_what_two_sensors_have_in_common_is_looked_behind(
     rest = rest_of(tmp_path, *views, context, offset, sensors=Sensors.DIFFERENT)
     assert rest is not None and rest.survey is not None
     assert (rest.survey.height >= LEAST_OF_REST) == is_one_place
-    # What is above the limit without windows need not be matched once more.
+    # A survey above the limit without windows needs no second match.
     assert (rest.without_edges is None) == is_one_place
     assert is_one_place or rest.without_edges.height > rest.survey.height

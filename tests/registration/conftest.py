@@ -27,7 +27,7 @@ def registration(textured: TexturedPair) -> Iterator[Registration]:
 
 @pytest.fixture
 def wide(registration: Registration) -> Registration:
-    """Return that registration as if the images shared only the left half of the grid."""
+    """Return the registration as if the images shared only the left half of the grid."""
     evidence = registration.evidence
     assert evidence is not None
     half = evidence.grid.window(0, 0, evidence.grid.width // 2, evidence.grid.height)

@@ -1,4 +1,4 @@
-"""What a registering tool leaves behind: its files, or a refusal's report."""
+"""The output of a registering tool: its files, or the report of a refusal."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def test_a_tools_parameters_go_into_the_specification_and_the_report(
         "matching_pixel_size": None,
     }
     spec = specified(SAR_SAR, parameters)
-    # Untouched pixels allow a shift only.
+    # Pixels without resampling allow a shift only.
     assert (spec.model, spec.max_error_px, spec.search_radius_m) == ("translation", 2.5, 150.0)
     assert (spec.rotation_deg, spec.scale) == (None, None)
     assert (spec.matcher, spec.radar) == (SAR_SAR.matcher, SAR_SAR.radar)

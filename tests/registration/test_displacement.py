@@ -1,4 +1,4 @@
-"""The displacement field as a raster: what is known of a pair whose shift is known."""
+"""The displacement field as a raster, for a pair with a known shift."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def test_the_file_holds_the_known_shift_and_how_well_it_is_known(
         assert [text.partition(":")[0] for text in raster.descriptions] == ["dx", "dy", "sigma"]
         assert raster.crs == registration.pair.grid.crs
         left, bottom, right, top = raster.bounds
-    # The input states a place 70 m too far east and 45 m too far south; pixels have 10 m.
+    # The input's georeferencing is wrong by 70 m east and 45 m south; pixels are 10 m.
     known = np.isfinite(dx)
     assert known.mean() > 0.5
     error = np.array([dx[known] + 70, dy[known] - 45])
     assert np.abs(error).max() < 1.0
     assert sigma[known].min() > 0 and sigma[known].max() < 2.0
-    # The error is one of what sigma states: beyond four of them lies one in 16 000.
+    # The error follows sigma: one in 16 000 exceeds four sigma.
     assert (np.abs(error) < 4 * sigma[known]).all()
-    # It covers the matching grid.
+    # The field covers the matching grid.
     corners = registration.pair.grid.pixel_to_map(registration.pair.grid.outline(1))
     assert left <= corners[:, 0].min() and right >= corners[:, 0].max()
     assert bottom <= corners[:, 1].min() and top >= corners[:, 1].max()
@@ -90,7 +90,7 @@ def test_without_georeferencing_it_is_in_pixels(
     shift = PolynomialModel("translation", Frame(Affine.identity()), np.array([[3.0, -2.0]]))
     estimate = replace(evidence.estimate, transform=Transform(shift, None, own))
     like, path = registration.pair.reference.source, tmp_path / "d.tif"
-    # The file's coordinates are the image's pixels, however large those are that were matched.
+    # The file's coordinates are in the image's own pixels, whatever size was matched.
     for lattice in (own, own.window(5, 4, 90, 80), own.scaled(2.0)):
         write_displacement(replace(evidence, grid=lattice, estimate=estimate), like, path)
         with rasterio.open(path) as raster:

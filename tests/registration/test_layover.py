@@ -1,4 +1,4 @@
-"""What heights displace matches by, of how they scatter along one line."""
+"""Relief displacement of matches, from their scatter along one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which masks a pair gets: the user's, and that of a dense town's ground."""
+"""The masks of a pair: the user's, and the mask of a dense town's ground."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def test_a_town_in_large_pixels_takes_part_as_a_whole(
     kind: str,
     elevated_px: float,
 ) -> None:
-    """Elevated objects displace all of it by 10 m, what is taken for ground by less than a pixel.
+    """Elevated objects displace the whole by 10 m, the supposed ground by less than a pixel.
 
-    In pixels of unknown size a rule refuses it.
+    In pixels of unknown size, a rule refuses it.
     """
     with opened(tmp_path, speckled(0.25), FIELDS, pixel_m=pixel_m) as pair:
         used = masked(pair, stack, context).used
@@ -86,7 +86,7 @@ def test_fields_need_no_ground(tmp_path: Path, stack: ExitStack, context: Contex
 def test_open_ground_is_matched_alone_where_it_is_most_and_not_all(
     tmp_path: Path, stack: ExitStack, context: Context, forest_share: float, kind: str | None
 ) -> None:
-    """Else it is the same registration once more, or outvoted."""
+    """Otherwise it would repeat the same registration, or be outvoted."""
     country = draw_country(420, forest_share, seed=1)
     with opened(tmp_path, country.seen(0, 4.0, 1), country.seen(8, 4.0, 2)) as pair:
         ground = ground_instead(pair, SceneInfo.of(pair), stack, context)
@@ -132,7 +132,7 @@ def test_layers_and_classifiers_become_rasters(
         assert both.reference.mask is not None and both.input.mask is not None
         valid = both.reference_patch(both.grid).valid
         assert valid[:, :199].all() and not valid[:, 201:].any()
-        # Nothing of the fields is bright.
+        # Nothing in the fields is bright.
         assert both.input_patch(both.grid, both.nominal_px).valid.mean() > 0.9
         alone, used = with_user_masks(pair, (classifier, None), stack, context)
         assert used is None

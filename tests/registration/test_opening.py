@@ -1,4 +1,4 @@
-"""How far the input of a pair is searched for where nobody states it."""
+"""The default search radius of a pair, where none is given."""
 
 from __future__ import annotations
 

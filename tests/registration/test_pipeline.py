@@ -1,4 +1,4 @@
-"""One pipeline: its stages, what it finds out once, and that every tool is judged by all rules."""
+"""One pipeline: its stages, facts that are found once, and all rules applied to every tool."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_a_registration_has_a_transform_points_and_a_verdict(
     # Points of the fit first, then check points.
     assert (np.diff(points.is_check.astype(int)) >= 0).all()
     assert points.is_check.sum() == registration.verdict.check_points
-    # No check point lies among the pixels that the fit saw.
+    # No check point lies on pixels that the fit saw.
     px = textured.grid.map_to_pixel(points.reference_xy)
     masked = Masked(registration.pair, registration.scene, registration.mask)
     stages = Stages.of(registration.pair, masked, registration.spec)
@@ -121,14 +121,14 @@ def test_images_that_are_placed_are_matched_from_there_alone(
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Return a radar's and a camera's image of a dense town."""
+    """Return a radar and a camera image of a dense town."""
     folder = tmp_path_factory.mktemp("town")
     with opened(folder, speckled(0.25), TOWN):
         return folder / "reference.tif", folder / "input.tif"
 
 
 def counting(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, object]]:
-    """Count from now on how often each fact is found, of each image."""
+    """Count from now on how often each fact of each image is determined."""
     found: Counter[tuple[str, object]] = Counter()
     keys: dict[str, tuple[Any, Callable[[Any], object]]] = {
         "variation2_of": (scene_module, lambda image: image.source.path),
@@ -165,13 +165,13 @@ def test_each_fact_about_an_image_is_found_once(
         result = run(pair, spec, context)
         assert max(found.values()) == 1
         if tool == "coregister":
-            # The radar's share and ground; nobody asks what is bright in the camera's.
+            # The radar image's share and ground; the camera's brightness is never needed.
             counts = Counter(name for name, _ in found)
             assert counts["variation2_of"] == 2
             assert counts["share_of_strong_scatterers"] == 1
             assert counts["find_ground"] == 1
         before = found.copy()
-        # Reports and summaries read nothing again.
+        # Reports and summaries do not read anything again.
         result.summary()
         result.scene.facts()
         assert found == before
@@ -214,12 +214,12 @@ def test_matchers_are_put_together_by_name(textured: TexturedPair, context: Cont
             stages = Stages.of(pair.images, masked, spec)
             assert isinstance(stages.fit, kind)
             if not isinstance(stages.fit, SurfaceFit):
-                # Radar images are looked at without the octave of their speckle.
+                # Radar images are matched without the octave of their speckle.
                 is_radar = isinstance(stages.fit, KeypointFit)
                 detector = SiftOctDetector(0.03) if is_radar else SiftDetector(0.03)
                 assert stages.fit.matcher.detector == detector
             assert isinstance(stages.matcher, ChipMatcher)
-            # All of them are blind to what is held out.
+            # No stage sees held-out pixels.
             assert stages.matcher.held_out is stages.held_out
 
 
@@ -256,7 +256,7 @@ def name_of(stage: str) -> str:
 
 @dataclass
 class HouseRules:
-    """Rules of stages, each of which notes that it is asked, and the last of which refuses."""
+    """Rules of stages that record every call; those of the last stage refuse."""
 
     stages: tuple[str, ...]
     is_final: bool = True
@@ -280,7 +280,7 @@ def refused_by_house_rules(
     call: Callable[[], object],
     is_final: bool = True,
 ) -> list[str]:
-    """Return the stages whose rules are asked until a call is refused by the last one's."""
+    """Return the stages whose rules are asked, up to the last stage, which refuses."""
     house = HouseRules(stages, is_final)
     monkeypatch.setattr(verdict, "RULES", house.rules())
     if stages[-1] == SEARCH:
@@ -293,7 +293,7 @@ def refused_by_house_rules(
 
 
 INSPECTED, SEARCHED = (IMAGES,), (IMAGES, SEARCH)
-# The images are judged before anything is matched, and with what matched.
+# The images are judged before anything is matched, and as part of the evidence.
 CHECKED = (IMAGES, IMAGES, AGREEMENT, ERROR, SCENE, SURVEY)
 
 
@@ -317,7 +317,7 @@ def test_every_tool_is_judged_by_the_rules_of_every_stage(
         return getattr(groundtie, tool)(files.reference, files.input, output)
 
     asked = refused_by_house_rules(monkeypatch, stages, call, is_final=tool != "register")
-    # One tool tries more than once.
+    # One tool makes more than one attempt.
     assert asked == list(stages) * (len(asked) // len(stages))
     assert (len(asked) > len(stages)) == (tool == "register")
     assert not output.exists()
@@ -363,9 +363,9 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Scene:
         ("refine_rpc", INSPECTED, INSPECTED),
         ("extract_gcps", SEARCHED, SEARCHED),
         ("refine_rpc", SEARCHED, SEARCHED),
-        # The images are judged again where the coarse shift has put them.
+        # The images are judged again at the coarse shift.
         ("extract_gcps", CHECKED, (IMAGES, *CHECKED)),
-        # First of the ground control, then of what comes of it.
+        # First on the ground control, then on the result.
         (
             "refine_rpc",
             (*CHECKED[:4], REFINEMENT),
@@ -412,7 +412,7 @@ def test_a_radius_beyond_the_images_is_warned_of_before_the_search(
 
 
 def beside_another_place(share: float, folder: Path) -> tuple[TexturedPair, Path]:
-    """Return a pair of which a share of squares of 64 px shows another place, and all of that."""
+    """Return a pair in which a share of the 64 px squares shows another place, and that place."""
     pair, other = (
         write_textured_pair(made_folder(folder / name), (450, 450), shift_on_map(73.0, -42.0), **of)
         for name, of in (("same", {"noise": 0.5}), ("other", {"input_seed": 5}))

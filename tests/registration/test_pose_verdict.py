@@ -89,7 +89,7 @@ class TestWhatAnotherSearchFound:
 
 @pytest.mark.slow
 def test_a_repetition_whose_right_place_lies_beyond_the_radius(context: Context) -> None:
-    """Shifted by 25 px, a scene that repeats after 32 px matches 7 px from its place, too."""
+    """A scene that repeats after 32 px, shifted by 25 px, also matches at a shift of 7 px."""
     rng = np.random.default_rng(7)
     scene = np.tile(texture(32, 32, 3), (8, 8))
     reference, input = (

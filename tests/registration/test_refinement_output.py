@@ -1,4 +1,4 @@
-"""What a refinement writes: the RPCs that it found, in each of their formats."""
+"""The output of a refinement: the RPCs in each of their formats."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_only_what_is_asked_for_is_named(tmp_path: Path) -> None:
 
 
 def image_beside(folder: Path, *names: str) -> Path:
-    """Write an image of RPCs in tags, or in files of some names, beside files of other ones."""
+    """Write an image with RPCs in tags, or in files of some names, beside files with other RPCs."""
     tags = {} if names else {"rpcs": to_rasterio(camera_rpc(SIZE))}
     path = write_raster(folder / "image.tif", np.ones(SIZE[::-1], np.uint8), **tags)
     for i, name in enumerate(names):
@@ -123,7 +123,7 @@ def test_rpcs_are_written_beside_no_image_whose_driver_prefers_others(
     write_rpc(tmp_path / output, camera_rpc(SIZE).shifted((0, 1000.0)))
     with rasterio.open(path) as dataset:
         line = float(dataset.tags(ns="RPC")["LINE_OFF"].split()[0])
-    # JPEG 2000 takes them as long as it has no .aux.xml with others.
+    # JPEG 2000 reads them unless an .aux.xml has others.
     assert (line > 1000) == (driver in ("GTiff", "JP2OpenJPEG"))
 
 

@@ -57,7 +57,7 @@ def test_refusals(fit: Control, check: Control | None, max_error_px: float, reas
 def test_what_displaces_all_control_alike_is_part_of_the_error(
     sigma_px: float, is_accepted: bool
 ) -> None:
-    """90 % of normal errors lie within 2.15 standard deviations; 3 px let 4.55 px pass."""
+    """90 % of normal errors lie within 2.15 standard deviations; a limit of 3 px allows 4.55 px."""
     found = refinement(control((20, -9)), common=Common(np.zeros(2), sigma_px))
     verdict = judge(found)
     assert verdict.accepted == is_accepted
@@ -65,7 +65,7 @@ def test_what_displaces_all_control_alike_is_part_of_the_error(
 
 
 def test_a_model_that_points_do_not_hold_is_refused() -> None:
-    """Points on a strip across the image show nothing of its rows."""
+    """Points on a strip across the image do not determine the rows."""
     fit = control((20, -9), 20, 1.2)
     strip = fit.expected_px * [1.0, 0.26]
     narrow = Control(strip, strip + fit.found_px - fit.expected_px, fit.covariance_px2, IMAGE_SIZE)

@@ -51,7 +51,7 @@ def test_the_moved_grid_puts_every_pixel_where_the_transform_does() -> None:
 
 
 def test_a_shift_in_another_crs_that_is_one_there_too() -> None:
-    """Within a small scene a shift in UTM is one in degrees, to a twentieth of a pixel."""
+    """Within a small scene, a shift in UTM is a shift in degrees to a twentieth of a pixel."""
     degrees = Grid(Affine(1e-4, 0, 9.0, 0, -1e-4, 45.1), CRS.from_epsg(4326), 100, 100)
     transform = Transform(shift_on_map(50.0, 20.0), UTM, degrees)
     moved = moved_grid(transform)
@@ -61,7 +61,7 @@ def test_a_shift_in_another_crs_that_is_one_there_too() -> None:
 
 
 def test_a_shift_that_is_none_in_the_inputs_crs_is_an_error() -> None:
-    """Over a whole degree, a hundred kilometres east are not everywhere as many degrees."""
+    """Over a whole degree, a hundred kilometres east are not equally many degrees everywhere."""
     wide = Grid(Affine(0.01, 0, 8.0, 0, -0.01, 50.0), CRS.from_epsg(4326), 300, 300)
     with pytest.raises(ParameterError, match="pixels cannot stay untouched"):
         moved_grid(Transform(shift_on_map(1e5, 0.0), UTM, wide))
@@ -90,13 +90,13 @@ def test_ground_lies_where_the_truth_has_it_on_every_grid(
         output.write(source, reference, textured.truth, outputs, context)
     with rasterio.open(output.path) as out, rasterio.open(textured.reference) as reference:
         assert out.crs == reference.crs
-        # The same ground in both: the textures are opposite, up to their noise.
+        # Both show the same ground: the textures are inverted, up to their noise.
         near = Grid(out.transform, out.crs, out.width, out.height)
     px = np.stack(np.meshgrid(np.arange(40, 200, 3), np.arange(40, 180, 3)), -1).reshape(-1, 2)
     there = np.rint(near.map_to_pixel(textured.grid.pixel_to_map(px))).astype(int)
     shown = pixels(output.path)[0][there[:, 1], there[:, 0]].astype(float)
     expected = textured.reference_values[px[:, 1], px[:, 0]].astype(float)
-    # Half a pixel of rounding on the untouched grid costs some of it.
+    # Rounding to the untouched grid costs some correlation: up to half a pixel.
     assert np.corrcoef(shown, expected)[0, 1] < -0.8
 
 
@@ -128,7 +128,7 @@ def test_a_reference_grid_in_another_crs_than_the_transform_shows_the_same_groun
     output = RegisteredOutput(tmp_path / "out.tif", "reference", "cubic")
     with open_raster(path) as source, Outputs() as outputs:
         output.write(source, target, Transform.nominal(UTM, GRID), outputs, one_thread)
-    # Waves of sixty pixels: GDAL's approximation of positions costs an eighth of one.
+    # With waves of sixty pixels, GDAL's approximation of positions costs an eighth of a pixel.
     np.testing.assert_allclose(pixels(output.path)[0], expected, atol=0.5)
 
 

@@ -1,4 +1,4 @@
-"""A registration: what it shows to people and programs, and that it closes what it opened."""
+"""A registration: its output for users and programs, and that it closes the files it opened."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def refused(registration: Registration) -> Registration:
 
 
 def first_checks(registration: Registration, count: int) -> Registration:
-    """Return a registration with the first of its check points alone."""
+    """Return a registration with only the first of its check points."""
     check = registration.check
     assert check is not None
     few = Check(
@@ -84,7 +84,7 @@ def test_a_registration_is_lines_for_people_and_json_for_programs(
     assert f"known to {low:.2f}–{high:.2f} px; 90 % in an ellipse of " in lines[4]
     assert f"{verdict.check_points_agreeing} of {verdict.check_points}" in lines[5]
     assert lines[-1] == "output: out.tif"
-    # 10 m pixels, in both units.
+    # Pixels of 10 m: both units.
     assert f"RMSE {verdict.check_rmse_px:.2f} px ({10 * verdict.check_rmse_px:.2f} m)" in lines[3]
 
 
@@ -115,7 +115,7 @@ def test_what_is_warped_beyond_the_overlap_is_stated(
 
 
 class TestWhatIsWrittenOverNothing:
-    """Outputs of `warp` and `report` are checked as those of tools are."""
+    """The outputs of `warp` and `report` are checked like those of tools."""
 
     @pytest.mark.parametrize("role", ["input", "reference"])
     def test_neither_over_an_image(
@@ -252,7 +252,7 @@ def test_left_as_a_context_manager_it_closes_its_rasters(textured: TexturedPair)
         assert found.pair.reference_patch(grid).valid.any()
         assert closed == []
     assert closed == [True]
-    # What was computed stays.
+    # Computed results remain.
     points, transform = found.tie_points, found.accepted()
     assert points is not None
     assert np.isfinite(transform(points.reference_xy)).all()

@@ -1,4 +1,4 @@
-"""Every rule has evidence that it refuses, alone, and evidence that it lets pass."""
+"""Every rule is tested by evidence that it alone refuses, and by evidence that it accepts."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ RANK = (
 
 ALL_RULES = tuple(chain.from_iterable(RULES.values()))
 
-# Dense towns: of a radar with speckle, and of one whose speckle a filter took.
+# Dense towns: in a radar image with speckle, and in one after speckle filtering.
 SPECKLED = scene(facts(variation2=0.2, **TOWN))
 ON_GROUND = MaskUsed(GROUND, "reference", 0.3, "as in a town")
 OBLIQUE = scene(facts(variation2=0.2, **TOWN), facts(is_in_sensor_geometry=True))
@@ -89,7 +89,7 @@ DESPECKLED = scene(facts(is_known_radar=True, **TOWN))
 
 
 def loose(by_px: float) -> Estimate:
-    """Return an estimate that varies by so much, and a little more, with each block of points."""
+    """Return an estimate that varies by slightly more than so much with each block of points."""
     shifts = [(side * by_px, 0.0) for side in (-1, 1)] * 3
     folds = tuple(partial(np.add, shift) for shift in shifts)
     return replace(estimated(fit_points()), fold_models=folds)
@@ -102,7 +102,7 @@ BEST = Pose(40.0)
 
 
 def pose(height: float = 9.0, rival: float = 3.0, found: Pose = BEST) -> PoseEvidence:
-    """Return the evidence of a pose beside the two best ones of an exhaustive search."""
+    """Return the evidence of a pose beside the two best poses of an exhaustive search."""
     best = PoseFound(BEST, height), PoseFound(Pose(-70.0), rival)
     return PoseEvidence([PoseFound(found, height)], best, (200, 100))
 
@@ -110,7 +110,7 @@ def pose(height: float = 9.0, rival: float = 3.0, found: Pose = BEST) -> PoseEvi
 def assessed(
     errors: np.ndarray, counted: int | None = None, **misses_px: float
 ) -> AssessmentEvidence:
-    """Return the evidence of points of which so many are inliers, and of ways back."""
+    """Return the evidence of points with a number of inliers, and of matches back."""
     count = len(errors)
     inliers = np.arange(count) < (count if counted is None else counted)
     points = PointErrors(np.zeros((count, 2)), errors, np.ones(count, bool), inliers)
@@ -118,7 +118,7 @@ def assessed(
 
 
 def of_nine(agreeing: int) -> Agreement:
-    """Return how nine points agree of which so many are inliers."""
+    """Return the agreement of nine points with a number of inliers."""
     return evidence(
         np.concatenate([scatter(agreeing, 0.3), np.full((9 - agreeing, 2), 9.0)])
     ).held_out
@@ -137,14 +137,14 @@ ANYWHERE = RANDOM.uniform(0, 499, (50, 2))
 
 
 def bands_apart(px: float) -> ImagesEvidence:
-    """Return the evidence of an input of which two bands are so far apart."""
+    """Return the evidence of an input with two bands displaced by so much."""
     displaced = facts(band_shifts=[BandShift((1, 2), px)])
     return ImagesEvidence(scene(input=displaced), MaskUsed.none(""), 3.0)
 
 
-# Of each rule: evidence that it refuses, and evidence that it does not.
+# For each rule, evidence that it refuses, and evidence that it accepts.
 EVIDENCE: dict[str, tuple[Any, Any]] = {
-    # 50 points within n px of a line: of 600 px, 60 px are a tenth.
+    # 50 points within n px of a line: 60 px are a tenth of 600 px.
     "tie points too near": (
         stored(ANYWHERE * [1, 0.001] + [0, 200], np.zeros((50, 2))),
         stored(ANYWHERE * [1, 0.02] + [0, 200], np.zeros((50, 2))),
@@ -174,7 +174,7 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "inconsistent ways": (assessed(GOOD, way=3.1), assessed(GOOD, way=2.9)),
     "pose by chance": (pose(height=4.9, rival=3.0), pose(height=5.1, rival=3.0)),
     "second pose": (pose(height=9.0, rival=5.7), pose(height=9.0, rival=5.5)),
-    # Three degrees move corners by 6 px, a degree by 2 px.
+    # Three degrees move the corners by 6 px, one degree by 2 px.
     "other pose": (pose(found=Pose(43.0)), pose(found=Pose(41.0))),
     "chance agreement": (evidence(np.zeros((2, 2))), evidence(np.zeros((3, 2)))),
     "small share of check points": (
@@ -288,7 +288,7 @@ def test_a_rule_lets_pass_what_is_just_within_its_limit(rule: Rule) -> None:
     refused, passed = EVIDENCE[rule.name]
     assert type(refused) is type(passed)
     assert rule.name not in refusing(passed)
-    # Of a search, any failure is refused or no refusal.
+    # For a search, every failure is a refusal.
     assert rule in RULES[stages.SEARCH] or refusing(passed) == []
 
 
@@ -314,7 +314,7 @@ def test_a_rule_states_its_limit_its_source_and_what_to_try(rule: Rule) -> None:
 
 
 def test_only_rules_of_the_evidence_are_asked() -> None:
-    """Rules of agreement and error judge refinements, too; those of scenes do not."""
+    """Rules of agreement and error also judge refinements; those of scenes do not."""
     assert ImagesEvidence.stages == (stages.BANDS, stages.IMAGES)
     assert SearchEvidence.stages == (stages.SEARCH,)
     assert RegistrationEvidence.stages == (

@@ -1,4 +1,4 @@
-"""Rules of registrations judge poses, too: by chips all over the overlap."""
+"""Rules of registrations also judge poses, by chips all over the overlap."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def posed(
     fine: Survey | None = None,
     **more: Any,
 ) -> PoseSurveyEvidence:
-    """Return the evidence of a pose that chips miss by residuals, shape (n, 2)."""
+    """Return the evidence of a pose from which chips differ by residuals, shape (n, 2)."""
     fitted = estimated(fit_points())
     found = PoseSurvey(
         GRID,
@@ -59,7 +59,7 @@ def posed(
 
 
 def fallen_beyond(count: int) -> np.ndarray:
-    """Return errors of matches that fell anywhere but where chips agree, shape (n, 2)."""
+    """Return random errors of matches outside the tolerance, shape (n, 2)."""
     errors = fallen(4 * count + 4)
     return errors[np.hypot(*errors.T) > POSE_TOLERANCE_PX][:count]
 
@@ -93,7 +93,7 @@ def test_poses_of_bands_that_are_displaced_are_refused(
 def test_rules_of_registrations_judge_poses(
     agreeing: int, found: Survey, rest: Rest | None, expected: list[str]
 ) -> None:
-    """Of 21 chips, about as many agree as at the worst real pose that is right."""
+    """About as many of 21 chips agree as at the worst correct real pose."""
     residuals = np.concatenate([scatter(agreeing, 1.5), fallen_beyond(21 - agreeing)])
     assert refusing(posed(residuals, found, rest=rest)) == expected
 
@@ -110,17 +110,17 @@ def test_smaller_chips_show_parts_too() -> None:
 def test_more_than_half_of_the_chips_agree_on_a_pose_that_only_shifts(
     agreeing: int, is_shift: bool, expected: list[str]
 ) -> None:
-    """Labels that are drawn into both arrays move no array otherwise."""
+    """Labels drawn into both arrays coincide only under such poses."""
     residuals = np.concatenate([scatter(agreeing, 0.5), np.full((25 - agreeing, 2), np.inf)])
     assert refusing(posed(residuals, is_shift=is_shift)) == expected
 
 
-# By 5 px, divided by √2 and times the radius of 90 % of a normal distribution, 2.15: 7.6 px.
+# The tolerance of 5 px over √2, times the 90 % radius of a normal distribution, 2.15: 7.6 px.
 @pytest.mark.parametrize(("half_px", "expected"), [(3.9, []), (4.6, ["uncertain transform"])])
 def test_heights_that_may_displace_a_pose_too_far_refuse_it(
     half_px: float, expected: list[str]
 ) -> None:
-    """Heights from -h to h have a mean of h above the lowest: the ground is anywhere in ± 2 h."""
+    """Heights from -h to h average h above the lowest: the ground lies anywhere within ± 2 h."""
     chips = replace(survey(), shifts_px=displaced(49, -half_px, half_px))
     assert refusing(posed(scatter(21, 0.5), chips)) == expected
     found = posed(scatter(21, 0.5), chips).held_out.accuracy.ce90_px

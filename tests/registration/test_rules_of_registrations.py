@@ -1,4 +1,4 @@
-"""Rules on registrations: what several facts together refuse, or let pass."""
+"""Rules on registrations: the joint effect of several facts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from groundtie.similarity.in_common import Sameness
 
 
 def test_what_heights_may_displace_all_points_by_is_refused() -> None:
-    """Chips that scatter evenly along a line by ± n px may be n px off, all of them."""
+    """If chips scatter evenly along a line by ± n px, all of them may be wrong by n px."""
 
     def along(reach_px: float) -> RegistrationEvidence:
         seen = survey()
@@ -56,14 +56,14 @@ def test_what_heights_may_displace_all_points_by_is_refused() -> None:
 def test_what_elevated_objects_displace_all_points_by_is_refused(
     elevated_px: float, expected: list[str]
 ) -> None:
-    """90 % of normal errors lie within 2.15 standard deviations; 3 px let 4.55 px pass."""
+    """90 % of normal errors lie within 2.15 standard deviations; a limit of 3 px allows 4.55 px."""
     whole = MaskUsed(NONE, None, 1.0, "as in a town", elevated_px=elevated_px)
     assert refusing(evidence(GOOD, mask=whole, max_error_px=3.0)) == expected
 
 
 @pytest.mark.parametrize("folds", [0, 1, 5])
 def test_a_transform_whose_error_is_unknown_is_refused(folds: int) -> None:
-    """No model without a block, one alone, and models that have no values."""
+    """No model without a block, a single one, and models without values."""
     unknown = replace(
         estimated(fit_points()), fold_models=(lambda px: np.full(px.shape, np.nan),) * folds
     )
@@ -140,7 +140,7 @@ def test_an_oblique_view_needs_more_check_points_on_the_ground(
 
 @pytest.mark.parametrize("kind", [GROUND, LAYER, SURFACE])
 def test_little_ground_may_be_weakly_similar(kind: str) -> None:
-    """A mask leaves little of each chip; other rules judge what it leaves."""
+    """A mask leaves little of each chip; other rules judge the rest."""
     weak = survey(height=1.9, rival=1.6)
     assert refusing(evidence(GOOD, survey=weak, mask=masked(kind))) == []
     assert refusing(evidence(GOOD, survey=weak)) == ["second place nearby", "weak similarity"]
@@ -161,7 +161,7 @@ def test_a_quarter_of_the_chips_must_overlap_where_the_transform_has_them(
 
 
 def test_parts_are_chips_that_do_not_confirm_between_others_that_do() -> None:
-    """Every other one of eleven in two rows: diagonals connect them, but the sixth lies apart."""
+    """Every other one of eleven in two rows: diagonals connect them, but the sixth is isolated."""
     found = survey(49, part=11)
     surfaces = found.surfaces.copy()
     surfaces[:11:2] = survey(49).surfaces[:11:2]
@@ -181,7 +181,7 @@ def test_without_locked_content_another_place_must_not_match_better() -> None:
 
 
 def test_of_what_is_drawn_nothing_that_is_left_is_evidence() -> None:
-    """Soft rims of it match, too: no survey of them is made, however high the whole one is."""
+    """Soft rims match, too, so the rest is not surveyed, however high the whole survey is."""
     rest = leaving(sameness=replace(DRAWN_OVER, sharpness=3.0))
     found = evidence(GOOD, survey=survey(height=20.0), rest=rest)
     assert refusing(found) == ["pixel-locked content"]
@@ -189,13 +189,13 @@ def test_of_what_is_drawn_nothing_that_is_left_is_evidence() -> None:
 
 @pytest.mark.parametrize(("chips", "is_refused"), [(200, True), (190, False)])
 def test_a_quarter_of_the_chips_must_be_left_to_confirm(chips: int, is_refused: bool) -> None:
-    """Few are high by chance; 49 are left."""
+    """A few chips are high by chance; 49 remain."""
     found = evidence(GOOD, survey=survey(), rest=leaving(survey(49), chips=chips))
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
 def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
-    """Tall buildings do, whose layover differs."""
+    """Tall buildings do, as their layover differs."""
     left = survey(3, part=5, height=6.0)
     assert left.parts
     rest = leaving(left, VIEWS)
@@ -209,7 +209,7 @@ def test_what_one_cameras_views_leave_may_lie_elsewhere_in_parts() -> None:
 def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
     height: float, rival: float, part: int, is_refused: bool
 ) -> None:
-    """Walls are a second place, canopies are parts: what is drawn over ground leaves both."""
+    """Walls are a second place, canopies are parts; drawn content over ground leaves both."""
     left = survey(part=part, height=height, rival=rival)
     left.surfaces[:part, SURVEY_RADIUS_PX - 5, SURVEY_RADIUS_PX + 9] = 6.0
     found = evidence(GOOD, survey=survey(), rest=in_common(Sensors.RADARS, left))
@@ -229,7 +229,7 @@ def test_what_two_views_have_not_in_common_must_not_match_elsewhere(
 def test_what_two_sensors_have_in_common_is_not_all_that_matches(
     heights: tuple[float, ...], masks: dict[str, MaskUsed], is_refused: bool
 ) -> None:
-    """What they leave without windows or edges; a town's ground is not asked."""
+    """The rest without windows or without edges must match; a town's ground is exempt."""
     found = evidence(GOOD, survey=survey(), rest=left_of_two_sensors(*heights), **masks)
     assert refusing(found) == ["nothing else in common"] * is_refused
 
@@ -241,13 +241,13 @@ def test_what_two_sensors_have_in_common_is_not_all_that_matches(
 def test_a_quarter_of_the_chips_that_copies_leave_must_show_something(
     chips: int, height: float, is_refused: bool
 ) -> None:
-    """Beneath one cloud deck over two grounds they match nowhere; a plain copy leaves few."""
+    """One cloud deck over two grounds leaves no match; a plain copy leaves few chips."""
     rest = leaving(survey(height=height, rival=0.2), VIEWS, chips=chips)
     found = evidence(GOOD, survey=survey(), rest=rest)
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
-# Of 49 chips' mean surfaces, standard deviations are a seventh.
+# The standard deviation of the mean surface of 49 chips is a seventh.
 @pytest.mark.parametrize("masks", [{}, {"mask": masked(GROUND)}])
 @pytest.mark.parametrize(("peak", "is_refused"), [(11.9 / 7, False), (12.1 / 7, True)])
 def test_a_second_peak_is_other_ground_however_high_the_first_is(
@@ -266,7 +266,7 @@ def test_what_is_left_must_have_no_second_peak(
     assert refusing(found) == ["pixel-locked content"] * is_refused
 
 
-# Nearer than 12 px lie roofs and canopies, of which one camera's views show little.
+# Within 12 px there are roofs and canopies, of which one camera's views leave little.
 @pytest.mark.parametrize(
     ("peak_px", "deviations", "sameness", "is_refused"),
     [
@@ -298,7 +298,7 @@ def test_a_peak_of_what_is_not_explained_stands_out_of_its_noise(noise: float) -
 
 @pytest.mark.parametrize(("chips", "is_refused"), [(12, False), (13, True)])
 def test_of_copies_too_little_is_left_that_is_not_explained(chips: int, is_refused: bool) -> None:
-    """What is left of them in few windows, of 49, is what resampling makes."""
+    """A rest in few of 49 windows is an effect of resampling."""
     left = survey(height=1.0, rival=0.0, peak=6.0, peak_px=13)
     left.surfaces[chips:] = 0
     found = evidence(GOOD, survey=survey(), unexplained=left)
@@ -334,7 +334,7 @@ def test_the_ground_of_a_town_is_not_found_in_pixels_of_unknown_size(
 def test_bands_of_the_reference_may_be_apart_if_one_is_chosen(
     name: str, has_chosen_band: bool, expected: list[str]
 ) -> None:
-    """Of the input, all bands are registered."""
+    """All bands of the input are registered."""
     displaced = facts(has_chosen_band=has_chosen_band, band_shifts=[BandShift((2, 3), 9.0)])
     assert refusing(ImagesEvidence(scene(**{name: displaced}), masked(NONE), 3.0)) == expected
     assert refusing(evidence(GOOD, scene=scene(**{name: displaced}))) == expected

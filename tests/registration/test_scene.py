@@ -1,4 +1,4 @@
-"""What the images of a pair are: found when it is first needed, and once."""
+"""Facts about the images of a pair: determined when first needed, and only once."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from groundtie.registration.specification import BOTH, NEITHER
         (FIELDS, FIELDS, False),
         (grey_values(0.1, 0.01), FIELDS, True),
         (grey_values(0.06, 0.01), FIELDS, False),
-        # Speckle shows which is the radar's: what the camera shows does not matter.
+        # Speckle identifies the radar image, whatever the camera image shows.
         (speckled(0.02), TOWN, False),
         (speckled(0.1), FIELDS, True),
         (speckled(0.25), speckled(0.25), False),
@@ -51,14 +51,14 @@ def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
             assert info.may_be_town == is_town
             assert info.radar is getattr(info, declared) and info.other is not info.radar
         assert SceneInfo.of(pair).sensors is not Sensors.DIFFERENT
-        # Two images of a camera's hide no radar's.
+        # Neither of two camera images is a radar image.
         assert not SceneInfo.of(pair, "neither").may_be_town
 
 
 @pytest.mark.parametrize(
     ("reference", "declared", "expected"),
     [
-        # Named, it is a radar's, and has no speckle.
+        # Declared a radar image, without speckle.
         (TOWN, REFERENCE, True),
         (TOWN, "auto", False),
         (FIELDS, REFERENCE, False),
@@ -116,18 +116,18 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
     camera = ground + random.normal(0, 3, ground.shape)
     with opened(tmp_path, radar, camera) as pair:
         one_way = SceneInfo.of(pair)
-        # Of both orders.
+        # In both orders.
         other_way = SceneInfo(one_way.input, one_way.reference)
         twice = SceneInfo(one_way.reference, one_way.reference)
         assert (one_way.radar_name, other_way.radar_name) == (REFERENCE, INPUT)
         for info in (one_way, other_way):
-            # Twenty looks are as homogeneous as a camera's grain.
+            # Twenty looks are as homogeneous as the grain of a camera image.
             assert (info.sensors is Sensors.DIFFERENT) == (looks < 20)
             assert info.sensors is not Sensors.RADARS
         assert (twice.sensors is Sensors.RADARS) == (looks < 20)
         appears = Sensors.DIFFERENT if looks < 20 else Sensors.CAMERAS
         for info, declared, expected in (
-            # A mask is made of what is declared of one image, whatever the other is.
+            # A mask uses the declaration of one image, whatever the other is.
             (twice, REFERENCE, Sensors.RADARS if looks < 20 else Sensors.DIFFERENT),
             (one_way, REFERENCE, Sensors.DIFFERENT),
             (one_way, BOTH, Sensors.RADARS),
@@ -140,7 +140,7 @@ def test_speckle_shows_which_is_the_radars(tmp_path: Path, looks: int) -> None:
 
 
 def test_two_rough_images_are_tested_for_layover_whatever_their_units() -> None:
-    """Power varies far more than amplitudes; towns are looked for in both."""
+    """Power varies far more than amplitude; both are searched for towns."""
     both = scene(facts(variation2=5.0, strong_share=0.25), facts(variation2=0.2))
     for declared in (AUTO, REFERENCE, BOTH):
         assert replace(both, declared=declared).sensors is Sensors.RADARS
@@ -162,7 +162,7 @@ def test_metadata_count_before_speckle(tmp_path: Path) -> None:
         assert info.sensors is Sensors.DIFFERENT
         swapped = SceneInfo(info.input, info.reference)
         assert swapped.radar_name == INPUT and swapped.sensors is Sensors.DIFFERENT
-    # Two radar images, of which one is filtered: neither is a camera's.
+    # Two radar images, one of them filtered: neither is a camera image.
     with opened(tmp_path, filtered, radar, filtered=(REFERENCE,)) as pair:
         info = SceneInfo.of(pair)
         pairs = [(info.reference, info.input), (info.input, info.reference)]
@@ -189,7 +189,7 @@ def test_facts_are_found_when_asked_for_and_never_again(
         for _ in range(2):
             assert info.sensors is Sensors.DIFFERENT and info.is_town and info.may_be_town
             assert not info.is_despeckled_town
-    # Of both images; what is bright in the camera's does not matter.
+    # Of both images; bright areas of the camera image do not matter.
     assert sorted(asked) == sorted(
         ["variation2_of"] * 2 + ["is_known_radar"] * 2 + ["share_of_strong_scatterers"]
     )

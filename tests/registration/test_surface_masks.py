@@ -1,4 +1,4 @@
-"""Masks by a surface model: whether it fits what the reference shows, and what it needs."""
+"""Masks by a surface model: its fit to the reference, and its requirements."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def pair_of(city: Path, stack: ExitStack, turned: bool = False) -> ImagePair:
 
 
 def fit_on(scene: Scene, stated: StatedSurface, stack: ExitStack) -> ModelFit:
-    """Return how a model fits a reference where it lies."""
+    """Return the fit of a model to a reference at its place."""
     _, fit = fitted_ground(scene, stated, stack)
     assert fit is not None
     return fit
@@ -151,7 +151,7 @@ def test_a_cameras_cast_shadows_show_where_the_model_lies(city: Path, stack: Exi
     right = stated(city)
     turned = replace(right, views=right.views[::-1])
     fit = fit_on(scene_of(pair_of(city, stack, turned=True), REFERENCE), turned, stack)
-    # The camera's image is misregistered, by 8 px and what is warped.
+    # The camera image is misregistered by 8 px and the warp.
     assert fit.is_clear and 3 <= np.hypot(*fit.offset_px) <= 14
 
 

@@ -21,7 +21,7 @@ FEET = CRS.from_user_input("+proj=utm +zone=32 +datum=WGS84 +units=us-ft")
 def test_the_border_moves_as_the_model_has_it_on_any_map(
     crs: CRS | None, kind: str, unknowns: int
 ) -> None:
-    """The leverage of each of n points, at the raster's corners, is the number of unknowns by n."""
+    """Each of n points at the raster's corners has the number of unknowns over n as leverage."""
     corners = GRID.outline(1)
     reference_xy = Transform.nominal(crs, GRID).nominal_xy(corners)
     points = TiePoints.unmeasured(reference_xy, corners, crs, ["used"] * 4)

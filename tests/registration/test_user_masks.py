@@ -1,4 +1,4 @@
-"""Masks that users have: by values, inside out, and found beside an image."""
+"""User masks: by values, inverted, and found beside an image."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def stack() -> Iterator[ExitStack]:
 
 
 def half_cloudy(path: Path, grid: Grid) -> Path:
-    """Write a classification: a cloud over the right half."""
+    """Write a classification with a cloud over the right half."""
     values = np.full((grid.height, grid.width), 4, np.uint8)
     values[:, grid.width // 2 :] = 9
     return write_raster(path, values, grid)
@@ -155,7 +155,7 @@ def called(
     values: str | None,
     images: tuple[Path, Path] = (Path("r.tif"), Path("i.tif")),
 ) -> dict[str, object]:
-    """Return what a tool is called with."""
+    """Return the arguments of a tool's call."""
     return {
         "reference": images[0],
         "input": images[1],

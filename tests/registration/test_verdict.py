@@ -64,7 +64,7 @@ def test_right_points_are_accepted_and_their_error_measured(sigma: float, wrong:
 
 def test_errors_of_single_check_points_are_none_of_the_transform() -> None:
     verdict = judged(check_points(scatter(72, 1.2)))
-    # 72 points of 0.3 px hold an affine model to 0.3 · √(3 / 72) an axis, in the mean.
+    # 72 points of 0.3 px determine an affine model to 0.3 · √(3 / 72) per axis, on average.
     assert 0.5 * 2.146 * 0.3 * math.sqrt(3 / 72) < verdict.accuracy.ce90_px < 0.5 * 2.146 * 1.2
 
 
@@ -96,7 +96,7 @@ def test_a_bias_is_refused(bias: tuple[float, float]) -> None:
 
 
 def test_a_bias_within_the_tolerance_counts_as_error() -> None:
-    """1.2 px off and a largest error of 1 px: the points agree, but not well enough."""
+    """With 1.2 px of bias and a largest error of 1 px, the points agree, but not well enough."""
     check = check_points(scatter(72, 0.3) + [1.2, 0])
     verdict = judged(check, max_error=1.0)
     assert not verdict.accepted
@@ -119,7 +119,7 @@ def test_points_in_one_corner_do_not_hold_the_rest() -> None:
     estimate = estimated(fit_points(within=(0.15, 0.15), sigma=0.5), "polynomial2")
     verdict = judged(check_points(scatter(72, 0.3)), estimate)
     assert not verdict.accepted
-    # Either it varies too much over the overlap, or check points far from the corner disagree.
+    # Either the model varies too much over the overlap, or check points far off disagree.
     assert "do not hold the model" in verdict.reason or "check points agree" in verdict.reason
 
 
@@ -169,7 +169,7 @@ def test_three_of_nine_check_points_are_not_enough(right: int, wrong: int, accep
 
 
 def test_fit_points_that_were_all_rejected() -> None:
-    """The model may come from surfaces; a hull of no points covers nothing."""
+    """The model may come from surfaces; the hull of no points covers nothing."""
     estimate = estimated(fit_points())
     none = estimate.points.reject(np.ones(len(estimate.points), bool), "forward–backward error")
     verdict = judged(
@@ -181,7 +181,7 @@ def test_fit_points_that_were_all_rejected() -> None:
 
 def test_summaries_are_json_whatever_happened() -> None:
     exact = judged(check_points(np.zeros((400, 2))))
-    # A probability of 10^-679 is no number of the machine's, but not a reason to fail either.
+    # A probability of 10^-679 underflows, but must not cause a failure.
     assert exact.log10_chance == pytest.approx(400 * math.log10(4 * math.pi / 25**2), rel=1e-6)
     assert exact.chance == 0.0
     one_fold = estimated(fit_points())
@@ -212,13 +212,13 @@ def test_a_refusal_names_its_rule_and_what_to_try() -> None:
 
 
 def test_the_first_rule_that_refuses_decides() -> None:
-    """Neither do these points agree, nor is there enough ground; agreement is asked first."""
+    """These points do not agree, and there is not enough ground; agreement is tested first."""
     little = MaskUsed("ground", "reference", 0.05, "as in a town")
     assert judge(evidence(fallen(72), mask=little)).rule == "chance agreement"
     errors = scatter(72, 0.3) + [1.2, 0.0]
     found = judge(evidence(errors, max_error_px=1.0, mask=little))
     assert found.rule == "error at held-out points"
-    # What is refused for its error or its scene has figures all the same.
+    # Results refused for their error or scene have figures all the same.
     assert found.check_rmse_px > 1
     assert judge(evidence(errors, mask=little)).check_rmse_px > 1
 
@@ -231,7 +231,7 @@ def test_a_search_that_failed_is_a_refusal_and_bad_input_is_not() -> None:
 
 
 def test_what_the_model_predicts_is_judged_not_the_nominal_place() -> None:
-    """Nominally the input lies 80 m off; the model knows it, so that its points agree."""
+    """Nominally the input is 80 m off; the model corrects it, so that its points agree."""
     shift = PolynomialModel("translation", TRUTH.model.frame, np.array([[80.0, -50.0]]))
     fit = fit_points()
     moved = Estimate(Transform(shift, UTM, GRID), fit, estimated(fit).fold_models)
@@ -248,5 +248,5 @@ def test_a_rule_at_any_stage_refuses(stage: str, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("groundtie.registration.verdict.RULES", {**RULES, stage: (rule,)})
     found = judge(good)
     assert (found.accepted, found.rule, found.reason) == (False, "house rule", "forbidden")
-    # Errors of matches that may be random measure nothing.
+    # Errors of possibly random matches measure nothing.
     assert math.isnan(found.check_rmse_px) == (stage == AGREEMENT)

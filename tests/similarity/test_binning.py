@@ -25,7 +25,7 @@ def test_equal_frequency_bins_hold_equally_many(bins: int) -> None:
 
 
 def test_bins_of_a_large_image_hold_nearly_equally_many() -> None:
-    """Quantiles of a sample: within a few per cent of the share of a bin."""
+    """Quantiles of a sample are accurate to a few per cent of a bin's share."""
     values = image(shape=(700, 500))
     counts = np.bincount(to_bins(values, everywhere(values), 16).ravel(), minlength=16)
     np.testing.assert_allclose(counts / values.size, 1 / 16, rtol=0.05)
@@ -33,13 +33,13 @@ def test_bins_of_a_large_image_hold_nearly_equally_many() -> None:
 
 @pytest.mark.parametrize("bins", [2, 7, 32, 128])
 def test_linear_bins_are_those_of_the_thesis(bins: int) -> None:
-    """S eq 3.38: the range of the values is divided evenly, the largest goes to the last bin."""
+    """S eq 3.38: the range of the values is divided evenly; the largest is in the last bin."""
     values = image()
     low, high = values.min(), values.max()
     scaled = np.floor((values.astype(float) - low) / (high - low) * bins)
     expected = np.minimum(scaled, bins - 1)
     found = to_bins(values, everywhere(values), bins, "linear")
-    # Values on an edge may go either way in single precision.
+    # Values on an edge may fall on either side in single precision.
     assert (found == expected).mean() > 0.999
     assert np.abs(found - expected).max() <= 1
     counts = np.bincount(found.ravel(), minlength=bins)

@@ -101,13 +101,13 @@ def test_masked_grey_values_against_their_definition(level: float) -> None:
 @pytest.mark.parametrize("strong", [1e2, 1e3, 1e4, 1e5, 1e6])
 @pytest.mark.parametrize("which", [0, 1])
 def test_masked_grey_values_beside_a_scatterer(which: int, strong: float) -> None:
-    """Which few of the shifts see, or all but where it meets a pixel that is not valid."""
+    """The scatterer is seen by a few shifts, or by all except where it meets an invalid pixel."""
     both = patches(True)
     at = (SHAPE[0] // 2, SHAPE[1] // 2) if which == 0 else (1, 1)
     both[which].values[at], both[which].valid[at] = 20 * strong, True
     found = correlate_grey(*both)
     np.testing.assert_allclose(found, coefficients(*both), atol=1e-3)
-    # It is exact for others beside it, too.
+    # Another chip in the same stack is unaffected.
     beside = patches(True, seed=5)
     stacks = [
         Patch(np.stack([p.values for p in side]), np.stack([p.valid for p in side]))

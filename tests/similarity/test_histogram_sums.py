@@ -1,4 +1,4 @@
-"""Histograms are added up to the same digits however they lie in memory."""
+"""Sums of histograms are identical to the last digit for every memory layout."""
 
 from __future__ import annotations
 

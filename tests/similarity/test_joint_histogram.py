@@ -1,4 +1,4 @@
-"""Against the definition of generalised partial volume estimation, pixel by pixel."""
+"""Joint histograms against the definition of generalised partial volume estimation, by pixel."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_counts_where_a_search_window_reaches_beyond_its_image(
 def test_all_ways_to_count_agree(
     monkeypatch: pytest.MonkeyPatch, masked: bool, shape: tuple[int, int]
 ) -> None:
-    """Which way is quickest depends on the sizes; what is counted must not."""
+    """The fastest way depends on the sizes; the counts must not."""
     bins = (4, 3)
     template, search = windows(masked, shape, bins)
     expected = with_numpy(template, search, bins)

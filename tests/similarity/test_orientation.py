@@ -53,11 +53,11 @@ def test_contrast_brightness_and_inversion_do_not_matter(scale: float) -> None:
 
 @pytest.mark.parametrize("degrees", [10, 30, 45, 80, 90, 135])
 def test_a_rotation_turns_the_field_twice_as_far(degrees: float) -> None:
-    """Waves along one direction: the field of turned waves is the same times e^(2 i θ)."""
+    """Waves along one direction: the field of rotated waves is the same times e^(2 i θ)."""
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(float)
     angle = np.deg2rad(degrees)
     along = x * np.cos(angle) + y * np.sin(angle)
-    # Where the waves' slope is steep the direction is well defined.
+    # The direction is well defined where the slope of the waves is steep.
     steep = np.abs(np.cos(2 * np.pi * along / 17)) > 0.3
     turned = field_of(np.sin(2 * np.pi * along / 17))[INNER][steep[INNER]]
     np.testing.assert_allclose(np.angle(turned * np.exp(-2j * angle)), 0, atol=0.02)
@@ -99,7 +99,7 @@ def test_masked_pixels_leave_no_edges(scale: float) -> None:
     around = cv2.dilate((~valid).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
     assert not masked[around].any()
     assert np.isfinite(masked).all()
-    # The typical gradient, that of fewer pixels, is nearly the same.
+    # The typical gradient, estimated from fewer pixels, is nearly the same.
     far = cv2.dilate((~valid).astype(np.uint8), np.ones((25, 25), np.uint8)) == 0
     np.testing.assert_allclose(masked[far], field_of(image, scale)[far], atol=0.05)
 
@@ -114,7 +114,7 @@ def test_an_image_without_content_has_no_field() -> None:
 
 @pytest.mark.parametrize(("background", "level"), [(0.0, 100), (1.0, 100), (200.0, 100), (0, -60)])
 def test_a_background_without_any_detail_does_no_harm(background: float, level: float) -> None:
-    """More than half of the window is a lake, or nodata that nobody declared; also in decibels."""
+    """More than half of the window is a lake or undeclared nodata; also in decibels."""
     image = np.full(SHAPE, background)
     image[:, 60:] = level + 15 * texture(SHAPE[0], SHAPE[1] - 60)
     for field in orientation_fields(everywhere(image)):
@@ -140,7 +140,7 @@ def test_amplitudes_are_compressed_and_decibels_left_alone() -> None:
     bright = amplitude > np.median(amplitude)
     expected = np.log(amplitude / np.median(amplitude) + 0.1)
     np.testing.assert_allclose(compress(everywhere(amplitude))[bright], expected[bright], atol=1e-5)
-    # A gain only adds a constant to a logarithm, here none: it is relative to the median.
+    # A gain adds a constant to the logarithm, here none, as it is relative to the median.
     scaled = compress(everywhere(amplitude * 37))
     np.testing.assert_allclose(scaled, compress(everywhere(amplitude)), atol=1e-4)
 
@@ -163,7 +163,7 @@ def test_masked_pixels_do_not_stand_out(level: float) -> None:
 
 
 def test_the_same_image_has_the_same_field_to_the_last_digit() -> None:
-    """Wherever its arrays lie in memory: the same seed is to give the same registration."""
+    """For every memory layout, as the same seed must give the same registration."""
     image = texture(73, 73)
     blocks, found = [], set()
     for size in range(1, 60):

@@ -37,10 +37,10 @@ def test_smooth_peaks_are_found_to_a_fiftieth_of_a_pixel(
 
 
 def test_the_covariance_is_the_scatter_of_found_peaks() -> None:
-    """Background of unit variance whose correlation has the peak's own shape."""
+    """Background of unit variance whose correlation has the shape of the peak."""
     rng = np.random.default_rng(0)
     sigma, height = 2.5, 12.0
-    # Noise filtered by a Gaussian has a correlation √2 as wide.
+    # Noise filtered by a Gaussian has a correlation that is √2 as wide.
     spectrum = sigma / np.sqrt(2)
     found, told = [], []
     for _ in range(600):
@@ -79,7 +79,7 @@ def test_a_peak_at_the_border_may_be_none(place: tuple[int, int]) -> None:
 def test_the_middle_is_no_shift_whatever_the_shape(part: tuple[slice, slice]) -> None:
     found = find_peak(gaussian(3.3, 2.2)[part].astype(np.float32))
     assert found.shift_px == pytest.approx((3.3, 2.2), abs=0.02)
-    # Anywhere in the window, along each axis: the variance of an even distribution.
+    # Anywhere in the window, along each axis: the variance of a uniform distribution.
     empty = np.zeros_like(X[part])
     expected = np.array(empty.shape[::-1]) ** 2 / 12
     np.testing.assert_allclose(np.diag(find_peak(empty).covariance_px2), expected, rtol=0.15)
@@ -90,7 +90,7 @@ def test_a_surface_without_peak() -> None:
     assert found.at_border
     assert found.height == 0
     assert np.isfinite(found.covariance_px2).all()
-    # Anywhere in the window: the variance of an even distribution over its width, and not less.
+    # Anywhere in the window: at least the variance of a uniform distribution over its width.
     assert found.covariance_px2[0, 0] >= 9**2 / 12 * 0.9
 
 

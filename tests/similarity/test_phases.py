@@ -13,7 +13,7 @@ SIDE, MARGIN = 128, 20
 
 
 def window(right: int = 0, down: int = 0, gain: float = 1.0) -> Patch:
-    """Return a stack of one window of a scene that is moved by whole pixels."""
+    """Return a stack with one window of a scene, displaced by whole pixels."""
     canvas = texture(SIDE + 2 * MARGIN, SIDE + 2 * MARGIN, 4)
     inside = canvas[MARGIN - down :, MARGIN - right :][:SIDE, :SIDE]
     return Patch((gain * inside).astype(np.float32)[None], np.ones((1, SIDE, SIDE), bool))

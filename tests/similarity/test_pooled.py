@@ -22,7 +22,7 @@ def patch(values: np.ndarray, valid: np.ndarray | None = None) -> Patch:
 def ground_chips(
     count: int, share: float, shift: tuple[int, int] = (0, 0), looks: float = 2.0
 ) -> list[tuple[Patch, Patch]]:
-    """Chips of a speckled image of which a mask leaves a share, and the other image around them."""
+    """Chips of a speckled image with a share left by a mask, and the other image around them."""
     random = np.random.default_rng(3)
     chips = []
     for _ in range(count):
@@ -50,7 +50,7 @@ def levels_of(chips: list[tuple[Patch, Patch]]) -> tuple[PooledHistogram, list[n
 
 
 def test_the_mean_is_mutual_information() -> None:
-    """As scikit-learn has it, of the same grey levels."""
+    """As computed by scikit-learn from the same grey levels."""
     levels, values = levels_of(on_each_other(ground_chips(40, 1.0)))
     edges = levels.template_edges, levels.search_edges
     sides = [np.searchsorted(e, v, side="right") for e, v in zip(edges, values, strict=True)]
@@ -77,7 +77,7 @@ def test_a_surface_sums_the_information_of_pixels() -> None:
 
 
 def test_chips_with_little_ground_find_their_place_together() -> None:
-    """What goes with what is told where they lie 2 px off; each has 1 % of its pixels."""
+    """Their joint histogram is estimated 2 px off; each chip has 1 % of its pixels."""
     chips = ground_chips(100, 0.01, shift=(2, -1))
     levels, _ = levels_of(on_each_other(chips))
     stacks = (
@@ -101,7 +101,7 @@ def test_speckle_is_averaged_over_what_is_valid_alone() -> None:
 
 @pytest.mark.parametrize("mean_db", [-40.0, -12.0, 0.0, 12.0])
 def test_decibels_of_either_sign_keep_their_order(mean_db: float) -> None:
-    """As by the mean of decibels; 3 dB below 0 is not 3 dB above it."""
+    """As by the mean of decibels: 3 dB below 0 is not 3 dB above 0."""
     random = np.random.default_rng(5)
     decibels = mean_db + 4 * gaussian_filter(random.normal(size=(90, 90)), 2.0) / 0.14
     found = smooth(patch(decibels)).values

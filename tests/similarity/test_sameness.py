@@ -22,7 +22,7 @@ def patch(values: np.ndarray, hidden: tuple[slice, slice] | None = None) -> Patc
 
 @pytest.mark.parametrize(("along", "contrast"), [(0.3, 1.0), (-0.45, -0.01)])
 def test_edges_are_found_to_a_fraction_of_a_pixel(along: float, contrast: float) -> None:
-    """The blurred step of a straight edge: the error function, whose gradient is a Gaussian's."""
+    """The blurred step of a straight edge: the error function, whose gradient is a Gaussian."""
     rows, cols = np.indices((61, 61))
     normal = np.array([np.cos(0.4), np.sin(0.4)])
     from_edge = (cols - 30) * normal[0] + (rows - 30) * normal[1] - along
@@ -47,13 +47,13 @@ def test_parallel_edges_are_as_far_apart_as_they_are(shift: float) -> None:
     apart = edges_apart_px(rings(25.0), rings(25.0 + shift))
     found = apart[np.isfinite(apart)]
     assert len(found) > 100
-    # Parabolas through three points of each place it to 0.08 px (see the test above). The inner
-    # one is brighter outside, where the other lies.
+    # Parabolas through three points of each edge locate it to 0.08 px (see the test above). The
+    # inner edge is brighter on its outer side, where the other edge lies.
     assert np.median(found) == pytest.approx(shift, abs=0.08)
 
 
 def test_distances_are_negative_on_the_darker_side() -> None:
-    """One lies 1.5 px on the darker side, one 1 px on the brighter."""
+    """One edge lies 1.5 px on the darker side, one 1 px on the brighter side."""
     cols = np.indices((80, 80))[1]
 
     def steps(*places: float) -> Edges:
@@ -82,7 +82,7 @@ def test_a_copy_moved_by_whole_pixels_coincides_at_that_shift_alone(
     other = Edges.of(patch(np.roll(values, (shift[1], shift[0]), (0, 1))))
     apart = edges_apart_px(one, other, np.array([shift, (shift[0] + 5, shift[1] - 3)]))
     assert apart.shape == (2, one.found.sum())
-    # What comes in at the rim changes which of the faintest are edges.
+    # New pixels at the rim change which of the faintest gradients are edges.
     assert (np.abs(apart[0]) < 1e-3).mean() > 0.95
     assert (np.abs(apart[1]) < 0.25).mean() < 0.2
 
@@ -105,7 +105,7 @@ def test_invalid_pixels_hold_no_edges() -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1 / 255, 257.0])
 def test_windows_are_the_same_where_one_thing_is_drawn_into_both(scale: float) -> None:
-    """Whatever grey values are a unit of: 8 bits, 16 bits, reflectances."""
+    """Whatever the unit of grey values: 8 bits, 16 bits, reflectances."""
     one, other = texture(120, 120, 1), texture(120, 120, 2)
     drawn = 5 * texture(120, 120, 3)
     where = np.s_[40:80, 40:80]
@@ -118,7 +118,7 @@ def test_windows_are_the_same_where_one_thing_is_drawn_into_both(scale: float) -
 
 
 def test_windows_of_one_grey_value_in_both_are_the_same() -> None:
-    """Also where they are most of the images, whose rounding is no scale."""
+    """Even if they are most of the images, whose rounding is then no scale."""
     one, other = np.full((120, 120), 40_000.0), np.full((120, 120), 0.3)
     one[40:80, 40:80] += 500 * texture(40, 40)
     other[40:80, 40:80] += 0.01 * texture(40, 40)
@@ -127,7 +127,7 @@ def test_windows_of_one_grey_value_in_both_are_the_same() -> None:
 
 @pytest.mark.parametrize("strong", [1e2, 1e3, 1e4])
 def test_a_strong_scatterer_makes_no_window_the_same(strong: float) -> None:
-    """Powers of two radar images, of which one pixel is 33 to 53 dB above the others."""
+    """Powers of two radar images with one pixel 33 to 53 dB above the others."""
     rng = np.random.default_rng(0)
     one, other = rng.exponential(0.05, (2, 100, 100))
     one[50, 50] = other[50, 50] = strong
@@ -137,7 +137,7 @@ def test_a_strong_scatterer_makes_no_window_the_same(strong: float) -> None:
 def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
     rng = np.random.default_rng(4)
     one = texture(120, 120)
-    # The difference varies by 2 · 0.2² = 0.08 of what one varies, a 25th of both.
+    # The variance of the difference is 2 · 0.2² = 0.08 of one image's, a 25th of both.
     other = one + 0.2 * rng.normal(size=one.shape)
     assert Windows.of(patch(one), patch(other)).same.mean() > 0.95
 
@@ -146,7 +146,7 @@ def test_noise_within_a_fifth_of_what_varies_leaves_windows_the_same() -> None:
 def test_windows_are_related_as_far_as_one_explains_the_other(
     gain: float, noise: float, least: float, most: float
 ) -> None:
-    """Of what varies by 1, noise leaves 1 / (1 + noise² / gain²): 0.96 of it, and 0.2."""
+    """For unit variance, noise leaves 1 / (1 + noise² / gain²): 0.96 of it, and 0.2."""
     rng = np.random.default_rng(4)
     one = texture(120, 120)
     other = 50 + gain * one + noise * rng.normal(size=one.shape)
@@ -159,13 +159,13 @@ def test_windows_of_two_places_are_rarely_related() -> None:
 
 
 def test_no_window_of_one_grey_value_is_related_to_one_that_varies() -> None:
-    """Nothing of what one shows follows from the other, which shows nothing: a sea, say."""
+    """Nothing of the one follows from the other, which shows nothing, such as a sea."""
     one, other = texture(120, 120, 1), texture(120, 120, 2)
     other[:, 40:] = 5
     constant = np.s_[:, 44:]
     for pair in ((one, other), (other, one)):
         assert not Windows.of(*map(patch, pair)).related[constant].any()
-    # Where both hold one grey value, as copies may, they still are.
+    # Where both hold one grey value, as copies may, they are still related.
     one[:, 40:] = 300
     assert Windows.of(patch(one), patch(other)).related[constant].all()
 

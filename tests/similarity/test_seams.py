@@ -1,4 +1,4 @@
-"""Seams: steps from one column or row to the next that both arrays have."""
+"""Seams: steps between neighbouring columns or rows that both arrays have."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ COLUMNS, ROWS = (31, 61, 104, 140, 190, 215), (50, 97, 171, 220)
 
 
 def view(place: int, seed: int) -> np.ndarray:
-    """Return a view of a place with speckle of its own (3 looks)."""
+    """Return a view of a place with independent speckle (3 looks)."""
     ground = np.exp(0.5 * texture(SIDE, SIDE, place))
     return 100 * ground * np.random.default_rng(seed).gamma(3.0, 1 / 3.0, ground.shape)
 
 
 def tiled(values: np.ndarray, offset: int = 0) -> np.ndarray:
-    """Return an image with darker and brighter tiles in turn, which end at columns and rows."""
+    """Return an image with alternately darker and brighter tiles, aligned with columns and rows."""
     row, col = (
         np.searchsorted(at, np.arange(SIDE) - offset, side="right") for at in (ROWS, COLUMNS)
     )
@@ -37,20 +37,20 @@ def width(one: np.ndarray, other: np.ndarray) -> float:
 
 @pytest.mark.parametrize("offset", [0, 1, -1])
 def test_tiles_over_different_ground_have_their_seams_in_common(offset: int) -> None:
-    """As far off as a transform to whole pixels may be."""
+    """At the largest offset that a transform to whole pixels may have."""
     assert width(tiled(view(1, 1)), tiled(view(9, 2), offset)) < DRAWN_WIDTH
 
 
 def test_ground_has_none_in_common() -> None:
     assert width(view(1, 1), view(1, 2)) > 1.5 * DRAWN_WIDTH
     assert width(view(1, 1), view(9, 2)) > 1.5 * DRAWN_WIDTH
-    # Tiles of one image alone, or elsewhere.
+    # Tiles in only one image, or at different places.
     assert width(tiled(view(1, 1)), view(9, 2)) > 1.5 * DRAWN_WIDTH
     assert width(tiled(view(1, 1)), tiled(view(9, 2), 6)) > 1.5 * DRAWN_WIDTH
 
 
 def test_edges_of_the_ground_along_columns_are_blurred() -> None:
-    """By a point spread function of one pixel, without any noise to hide them."""
+    """By a point spread function of one pixel, without noise that would hide them."""
     at = np.arange(SIDE)
     fields = 1 + sum(1 / (1 + np.exp(-(at - edge) / 0.6)) for edge in (40, 90, 155, 201))
     one, other = (fields[None] * np.exp(0.05 * view(place, place) / 100) for place in (1, 9))

@@ -25,7 +25,7 @@ CHIP, RADIUS = 48, 7
 SPAN = 2 * RADIUS + 1
 SIDE = CHIP + 2 * BORDER_PX
 
-# Measures that studies compare are registered here as a new one would be.
+# Measures that studies compare, registered here like new ones.
 STUDIED = tuple(name for name in HISTOGRAM_MEASURES if name not in SIMILARITIES)
 EVERY = (*SIMILARITIES, *STUDIED)
 
@@ -39,7 +39,7 @@ def _studied_measures(monkeypatch: pytest.MonkeyPatch) -> None:
 def patches(
     shift: tuple[int, int] = (0, 0), seed: int = 0, noise: float = 0.2
 ) -> tuple[Patch, Patch]:
-    """Return a template and a search window whose content lies `shift` (x, y) further."""
+    """Return a template and a search window whose content is displaced by `shift` (x, y)."""
     rng = np.random.default_rng(seed)
     scene = texture(SIDE + 4 * RADIUS, SIDE + 4 * RADIUS, seed)
     x, y = shift
@@ -124,7 +124,7 @@ def test_surfaces_of_different_places_are_background(similarity: str) -> None:
 @pytest.mark.parametrize("similarity", EVERY)
 @pytest.mark.parametrize("which", ["template", "search"])
 def test_masked_pixels_do_not_count(similarity: str, which: str) -> None:
-    """What masked pixels hold does not matter; the rest still finds the peak."""
+    """The content of masked pixels does not matter; the rest still finds the peak."""
     settings = SimilaritySettings(similarity)
     pair = dict(zip(("template", "search"), patches((3, -2)), strict=True))
     valid = np.ones(pair[which].valid.shape, bool)
@@ -208,7 +208,7 @@ def test_normalised_surfaces_count_in_robust_standard_deviations() -> None:
 
 @pytest.mark.parametrize("make", [normalise, detrend])
 def test_what_is_not_known_of_a_surface_changes_nothing_of_the_rest(make: Callable) -> None:
-    """Where most shifts are unknown, all vary little: the rest has its own standard deviation."""
+    """Where most shifts are unknown, the rest is normalised by its own standard deviation."""
     rng = np.random.default_rng(1)
     surfaces = (300 + rng.normal(size=(2, 49, 49))).astype(np.float32)
     known = np.ones(surfaces.shape, bool)
@@ -223,7 +223,7 @@ def test_what_is_not_known_of_a_surface_changes_nothing_of_the_rest(make: Callab
 
 
 def test_few_valid_pixels_in_thin_strips_make_no_peak_of_hundreds() -> None:
-    """Wide filters have no valid pixel in most shifts: their surface is 0 but at a few."""
+    """Wide filters have no valid pixel at most shifts: their surface is 0 except at a few."""
     heights = []
     for seed in range(20):
         template, search = patches(seed=seed)
@@ -232,7 +232,7 @@ def test_few_valid_pixels_in_thin_strips_make_no_peak_of_hundreds() -> None:
         template.valid[:, columns % 24 > 8] = False
         search.valid[:, : search.valid.shape[1] // 3] = False
         heights.append(np.abs(surface_of(template, search, SimilaritySettings("fused"))).max())
-    # The highest of some 250 independent values: 6 is once in a hundred thousand surfaces.
+    # The highest of some 250 independent values exceeds 6 once in a hundred thousand surfaces.
     assert max(heights) < 10
 
 
@@ -244,7 +244,7 @@ def test_the_trend_goes_and_the_peak_stays() -> None:
     surface = (peak + slope + rng.normal(size=x.shape)).astype(np.float32)
     found = detrend(surface)
     assert np.unravel_index(found.argmax(), found.shape) == (16, 23)
-    # What is left inside follows no slope.
+    # No slope remains inside.
     smooth = median_filter(found, 9)[8:-8, 8:-8]
     assert np.abs(smooth).max() < 2
     assert np.ptp(gaussian_filter(surface, 5.0)[8:-8, 8:-8]) > 6

@@ -11,7 +11,7 @@ SIDE = 120
 
 
 def stack(values: np.ndarray, hidden: object = None) -> Patch:
-    """Return a stack of one window."""
+    """Return a stack with one window."""
     valid = np.ones(values.shape, bool)
     if hidden is not None:
         valid[hidden] = False
@@ -34,7 +34,7 @@ def test_nothing_is_left_of_a_copy_in_any_contrast(gain: float, offset: float) -
 
 
 def test_a_bright_scatterer_elsewhere_changes_nothing() -> None:
-    """Of a copy nothing is left but around it, where rounding is as large as the ground."""
+    """A copy leaves nothing except around it, where rounding is as large as the ground."""
     reference = 500 + 100 * ground(1)
     reference[20, 20] = 5e6
     left = unexplained(stack(reference), stack(2 * reference + 10))
@@ -70,7 +70,7 @@ def test_invalid_pixels_explain_nothing_and_are_not_left() -> None:
     left = unexplained(stack(ground(2)), stack(drawn, hidden))
     assert not left.valid[0][hidden].any()
     assert left.valid.sum() == SIDE**2 - 20 * 40
-    # Nothing is left of a copy.
+    # A copy leaves nothing.
     copy = unexplained(stack(reference), stack(drawn, hidden))
     assert not copy.valid.any()
 
