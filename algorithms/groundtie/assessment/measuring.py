@@ -183,7 +183,7 @@ def read_points(path: Path, transform: Transform) -> TiePoints:
     TooFewPointsError
         All points are rejected, or there are none.
     GeoreferencingError
-        Only one of the file and the transform has a CRS, or a position lies outside of it.
+        Only one of the file and the transform has a CRS, or a position lies outside of the map's.
     """
     points = read_tie_points(path, transform.input_grid, table_crs=transform.crs)
     if not points.used.any():

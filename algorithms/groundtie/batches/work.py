@@ -140,7 +140,7 @@ def bug(error: Exception) -> str:
 
 
 def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:
-    """Return size in bytes and time in nanoseconds of those of these files that exist.
+    """Return size in bytes and time in nanoseconds of the existing ones among these files.
 
     Folders, whose times change with any file in them, have zeros.
     """

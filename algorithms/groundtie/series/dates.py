@@ -220,8 +220,8 @@ def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
     """Return facts that determine a raster's pixels and their place: its files and its metadata.
 
     Viewers write statistics into a raster's `.aux.xml`: that file counts by the raster's metadata
-    without statistics. A raster on a server counts by its name and metadata. A raster of which no
-    file is found never counts as unchanged.
+    without statistics. A raster on a server counts by its name and metadata. A raster whose files
+    are not found never counts as unchanged.
 
     Parameters
     ----------

@@ -254,7 +254,7 @@ class _Network:
         return np.array(found)
 
     def confirmed(self) -> Mask:
-        """Return which dates lie in loops and do not hang on the hub by a single link, (n,)."""
+        """Return which dates lie in loops and reach the hub by more than a single link, (n,)."""
         edges = [(link.first, link.second) for link in self.links]
         inner = []
         for k, (first, second) in enumerate(edges):

@@ -246,7 +246,7 @@ class Matching:
             self.keep(result)
 
     def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
-        """Return pairs of each date with the next in time, and with one that overlaps much more."""
+        """Return pairs of each date with the next in time, and with one of much larger overlap."""
         pairs = []
         for number, date in enumerate(chain[:-1]):
             following = chain[number + 1]
