@@ -3,9 +3,9 @@
 Tools are functions (`coregister`, `warp`, `simulate`, …) of files, arrays (`Raster`) and open
 datasets; see `groundtie.tools`. `load_transform` reads the transform that a registration wrote.
 
-What is decided on the way, and why, goes to `logging` under this package's name: steps at level
-INFO, rejected tie points at DEBUG, what is written beyond the overlap at WARNING. Without a
-handler of the caller's it goes nowhere.
+Decisions and their reasons are logged under this package's name: steps at level INFO, rejected tie
+points at DEBUG, output beyond the overlap at WARNING. Without a handler of the caller's, nothing
+is shown.
 """
 
 from __future__ import annotations

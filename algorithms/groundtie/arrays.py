@@ -1,4 +1,4 @@
-"""Rasters that are no files: numpy arrays with their place on the map, and xarray's."""
+"""Rasters in memory: numpy and xarray arrays with their place on the map."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rasterio.errors import CRSError
 
 from .errors import GeoreferencingError, ParameterError
 
-# Types that GDAL or OpenCV do not support, and those that hold their values.
+# Types that GDAL or OpenCV do not support, and supported types that hold their values.
 _HELD_BY = {
     np.dtype(bool): np.dtype(np.uint8),
     np.dtype(np.float16): np.dtype(np.float32),
@@ -34,27 +34,26 @@ _EVEN_PX = 0.05
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Raster:
-    """An array with its place on the map: what the tools take in place of a raster file.
+    """An array with its place on the map, which tools take instead of a raster file.
 
     Parameters
     ----------
     values
-        Pixels, shape (h, w) or (bands, h, w). What a masked array masks holds no data, nor do NaN
-        and infinity.
+        Pixels, shape (h, w) or (bands, h, w). Masked pixels, NaN and infinity hold no data.
     transform
         Corner-based geotransform, as rasterio's and GDAL's; None: positions are pixels.
     crs
-        Coordinate reference system, or what `rasterio.crs.CRS.from_user_input` takes for one
+        Coordinate reference system, or a value for `rasterio.crs.CRS.from_user_input`
         ("EPSG:32632", 32632); None: local coordinates.
     nodata
         Value of pixels that hold no data.
     called
-        What messages call it besides its size: tools take the parameter's name.
+        Its name in messages, beside its size: tools use the parameter's name.
 
     Raises
     ------
     ParameterError
-        The values are no image of numbers, the transform or CRS is none, or nodata no number.
+        The values are no image of numbers, the transform or CRS is invalid, or nodata is no number.
     GeoreferencingError
         A CRS without a transform.
     """
@@ -76,7 +75,7 @@ class Raster:
             raise ParameterError(
                 f"transform must be an affine.Affine, not {type(self.transform).__name__}"
             )
-        # Also false where one of them is NaN.
+        # The comparison is also false if the transform holds NaN.
         if self.transform is not None and not 0 < abs(self.transform.determinant) < np.inf:
             raise GeoreferencingError("the array's transform gives its pixels no size")
 
@@ -84,7 +83,7 @@ class Raster:
     def from_xarray(cls, array: Any) -> Raster:
         """Return an `xarray.DataArray` that rioxarray locates (extra `xarray`) as a raster.
 
-        One that has a CRS, but neither coordinates nor a transform, is in pixel coordinates.
+        An array with a CRS, but neither coordinates nor a transform, is in pixel coordinates.
 
         Raises
         ------
@@ -116,7 +115,7 @@ class Raster:
     def to_xarray(self) -> Any:
         """Return this raster as an `xarray.DataArray` (extra `xarray`) of (band, y, x) or (y, x).
 
-        What is masked becomes NaN.
+        Masked pixels become NaN.
 
         Raises
         ------
@@ -159,13 +158,13 @@ class Raster:
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
         size = f"array of {self.width} × {self.height}"
         return f"{size} ({self.called})" if self.called else size
 
     @property
     def identity(self) -> Hashable:
-        """The same for rasters whose pixels are the same numbers in the same memory."""
+        """Equal for rasters whose pixels are the same numbers in the same memory."""
         held = np.ma.getdata(self.values)
         return held.__array_interface__["data"][0], held.shape, held.strides, held.dtype.str
 
@@ -182,7 +181,7 @@ class Raster:
 
 
 def in_memory(value: Any) -> Any:
-    """Return what is given for a raster, other than a name, as a `Raster` or an open dataset.
+    """Return a raster that is given otherwise than by name, as a `Raster` or an open dataset.
 
     Parameters
     ----------
@@ -193,9 +192,9 @@ def in_memory(value: Any) -> Any:
     Raises
     ------
     ParameterError
-        It is one of these, but of no use.
+        The value is one of these, but cannot be used.
     """
-    # What rasterio has opened: a file, a `MemoryFile` or a `WarpedVRT`.
+    # A dataset that rasterio has open: a file, a `MemoryFile` or a `WarpedVRT`.
     is_dataset = hasattr(value, "read_masks") and hasattr(value, "nodatavals")
     if isinstance(value, Raster) or is_dataset:
         return value
@@ -223,12 +222,12 @@ def _transform_of(array: Any) -> Affine | None:
     located = array.rio
     stored = located.transform()
     if located.x_dim not in array.coords or located.y_dim not in array.coords:
-        # rioxarray has the identity for none.
+        # rioxarray returns the identity if there is no transform.
         return None if stored.is_identity or located.crs is None else stored
     for dim in (located.x_dim, located.y_dim):
         _require_even(str(dim), np.asarray(array.coords[dim]))
-    # The stored one is exact, but that of the whole where the array is a part: coordinates
-    # show which.
+    # The stored transform is exact, but may be that of a larger array of which this is a part:
+    # coordinates show which.
     found = located.transform(recalc=True)
     corners = np.array([[0, 0, 1], [located.width, located.height, 1]])
     apart = corners @ np.subtract(found[:6], stored[:6]).reshape(2, 3).T
@@ -238,10 +237,10 @@ def _transform_of(array: Any) -> Affine | None:
 def _require_even(name: str, coordinates: NDArray[Any]) -> None:
     """Raise an error unless coordinates, shape (n,), are those of an even grid."""
     even, step = np.linspace(coordinates[0], coordinates[-1], coordinates.size, retstep=True)
-    # Those of netCDF are often floats of four bytes, and rounded by more than a share of a pixel.
+    # Coordinates of netCDF are often 4-byte floats, rounded by more than a share of a pixel.
     rounded = np.spacing(np.abs(coordinates).max()) if coordinates.dtype.kind == "f" else 0.0
     apart = np.abs(coordinates - even).max()
-    # Of a single coordinate, the step is NaN; of several, where one of them is.
+    # The step is NaN for a single coordinate, and if one of several is NaN.
     if coordinates.size > 1 and not apart <= _EVEN_PX * abs(step) + 2 * rounded:
         raise GeoreferencingError(
             f"the coordinates {name} of an array are uneven: rows or columns of it are missing, "
@@ -260,7 +259,7 @@ def _nodata(nodata: Any, own: np.dtype[Any]) -> Any:
     if nodata is not None and not isinstance(nodata, Real):
         raise ParameterError(f"nodata must be a number, not {nodata!r}")
     if nodata is not None and own == np.float16:
-        # As the array had to round it; no tolerance for single precision is as wide.
+        # Rounded as in the array: tolerances for single precision are narrower.
         with np.errstate(over="ignore"):
             return float(np.float16(nodata))
     # Not as a float, which would round large whole numbers.

@@ -1,4 +1,4 @@
-"""The paths of one call: nothing that it reads or writes is written over by something else."""
+"""The paths of one call: no file that it reads or writes is overwritten by another."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .vrt_sources import sources_of
 
 
 def check_different(rasters: Mapping[str, Any]) -> None:
-    """Raise `SameFileError` if two of these checked rasters, by name, are one and the same."""
+    """Raise `SameFileError` if two of these checked rasters, by name, are the same."""
     taken: dict[Hashable, str] = {}
     for name, raster in rasters.items():
         other = taken.setdefault(_identity(raster), name)
@@ -44,11 +44,11 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     Raises
     ------
     SameFileError
-        An output, or a file that is written because of it, is an input, what a virtual raster
-        among these is made of, or another one.
+        An output, or a file that is written with it, is an input, a source of a virtual raster
+        among the inputs, or another output.
     OutputError
-        An output's folder is missing or cannot be written to, a folder is a file, or a file is in
-        the place of the numbers of a report.
+        An output's folder is missing or cannot be written to, a folder is a file, or another file
+        is in the place of a report's numbers.
     """
     taken: dict[Hashable, str] = {}
     outputs: list[tuple[str, WrittenKind, Path]] = []
@@ -89,7 +89,7 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
 def check_numbers(name: str, path: Path) -> None:
     """Raise `OutputError` if the numbers of the report `name` would replace something else.
 
-    That may be a file that is read without being named, as the STAC item of an image.
+    Such a file may be read without being named, as the STAC item of an image.
     """
     if path.exists() and _format(path) != REPORT_FORMAT:
         raise OutputError(
@@ -106,7 +106,7 @@ def inputs_of(kind: Kind, value: Any) -> tuple[Any, ...]:
 
 
 def _check_place(name: str, path: Path, made: set[Path]) -> None:
-    """Raise `OutputError` if there can be no such file; some folders are `made` by the call."""
+    """Raise `OutputError` if a file cannot be written; some folders are `made` by the call."""
     folder = path.resolve().parent
     if path.is_dir():
         raise OutputError(f"{name} is a folder, not a file: {path}")
@@ -119,10 +119,10 @@ def _check_place(name: str, path: Path, made: set[Path]) -> None:
 
 
 def _identity(raster: Any) -> Hashable:
-    """Return what is the same for two rasters that are one."""
+    """Return a key that is equal for two names of one raster."""
     if isinstance(raster, (str, Path)):
         return identity(raster)
-    # An open dataset is where its file is.
+    # An open dataset is identified by its file.
     return getattr(raster, "identity", None) or Path(raster.name).resolve()
 
 

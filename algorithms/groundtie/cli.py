@@ -80,9 +80,9 @@ def _usage(error: click.ClickException) -> str:
 
 @contextmanager
 def _open_streams() -> Iterator[None]:
-    """Have streams that take every text, so that none costs the result that it is about.
+    """Make standard streams take any text, so that printing cannot cost a result.
 
-    Who calls this from Python has the own ones afterwards, as they were.
+    A caller from Python has its own streams back afterwards, unchanged.
     """
     _take_numbers()
     with _open_stream(sys.stdout, redirect_stdout), _open_stream(sys.stderr, redirect_stderr):
@@ -90,21 +90,21 @@ def _open_streams() -> Iterator[None]:
 
 
 def _take_numbers() -> None:
-    """Take the numbers of closed streams: of 0 to 2, the next file that is opened would get one.
+    """Occupy the descriptors, 0 to 2, of closed streams, or the next opened file would get one.
 
-    What libraries write to standard error would be written to that file.
+    Libraries' messages for standard error would then be written to that file.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            # The lowest number that is free is this one.
+            # The lowest free descriptor is this one.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
 
 
 @contextmanager
 def _open_stream(stream: Any, redirect: Callable[[TextIO], Any]) -> Iterator[None]:
-    """Swallow what is written to a closed stream; write signs that an open one lacks by number."""
+    """Discard text for a closed stream; escape characters that an open one cannot encode."""
     if _is_closed(stream):
         with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect(nowhere):
             yield
@@ -114,7 +114,7 @@ def _open_stream(stream: Any, redirect: Callable[[TextIO], Any]) -> Iterator[Non
         try:
             yield
         finally:
-            # It writes what is left, too: a full disk or a closed pipe was reported already.
+            # This flushes, too: a full disk or a closed pipe has been reported already.
             with suppress(OSError, ValueError):
                 stream.reconfigure(errors=errors)
     else:
@@ -124,15 +124,15 @@ def _open_stream(stream: Any, redirect: Callable[[TextIO], Any]) -> Iterator[Non
 def _is_closed(stream: Any) -> bool:
     try:
         return stream is None or getattr(stream, "closed", False)
-    except ValueError:  # of one without its buffer
+    except ValueError:  # a stream without its buffer
         return True
 
 
 def _silence_libraries() -> None:
     """Keep the messages of GDAL and OpenCV and Python's warnings off standard error.
 
-    The tools raise errors of their own; who wants to see the libraries' asks for it by `python
-    -W`, `PYTHONWARNINGS`, `CPL_LOG` or `OPENCV_LOG_LEVEL`.
+    The tools raise errors of their own. `python -W`, `PYTHONWARNINGS`, `CPL_LOG` or
+    `OPENCV_LOG_LEVEL` show those of the libraries.
     """
     os.environ.setdefault("CPL_LOG", os.devnull)  # GDAL's messages past rasterio
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
@@ -142,7 +142,7 @@ def _silence_libraries() -> None:
 
 
 class _SecondSignal(BaseException):
-    """Ends the work where it is; for an interrupt by the keyboard click would print a line."""
+    """Ends the work at once; for a `KeyboardInterrupt`, click would print a line."""
 
 
 @contextmanager
@@ -208,7 +208,7 @@ class ToolGroup(click.Group):
         return None if name is None else ToolCommand(load_tool(name))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Return the commands that begin so; none of them is loaded for it."""
+        """Return the commands with this beginning, without loading them."""
         options = super().shell_complete(ctx, incomplete) if incomplete.startswith("-") else []
         return options + [
             CompletionItem(command, help=named_tool(name).summary)
@@ -217,7 +217,7 @@ class ToolGroup(click.Group):
         ]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a line for each tool; none of them is loaded for it."""
+        """Write a line for each tool, without loading it."""
         rows = [(command, named_tool(name).summary) for command, name in self._names.items()]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
@@ -238,13 +238,13 @@ def _before_command(
     if memory is not None:
         context.with_resource(_budget(memory))
     if workers is not None and context.invoked_subcommand is not None:
-        # As if it stood behind the name; of a tool that has no workers it is not asked.
+        # As if given after the tool's name; tools without workers do not ask for it.
         context.default_map = {context.invoked_subcommand: {"workers": workers}}
 
 
 @contextmanager
 def _budget(megabytes: str) -> Iterator[None]:
-    """Set the budget of this process, and of those that it starts."""
+    """Set the memory budget of this process, and of those that it starts."""
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = megabytes
     try:
@@ -259,7 +259,7 @@ def _budget(megabytes: str) -> Iterator[None]:
 
 @contextmanager
 def _log_to(stream: TextIO) -> Iterator[None]:
-    """Write the package's log to a stream, and of the libraries' log what they warn of."""
+    """Write the package's log to a stream, and the warnings of the libraries' logs."""
     handler = logging.StreamHandler(stream)
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
     own, root = logging.getLogger(__package__), logging.getLogger()
@@ -325,7 +325,7 @@ class ToolCommand(click.Command):
 
 
 def _click_parameter(parameter: Parameter) -> click.Parameter:
-    """Return a parameter as click reads it: as words, which the tool checks."""
+    """Return a parameter as click reads it, as text that the tool checks."""
     name, flag, kind = parameter.name, spelled(parameter), parameter.kind
     if isinstance(kind, Flag):
         return click.Option([f"{flag}/--no-{flag[2:]}", name], default=parameter.default)
@@ -338,7 +338,7 @@ def _click_parameter(parameter: Parameter) -> click.Parameter:
 
 
 def _completions(kind: Kind) -> Callable[..., list[CompletionItem]]:
-    """Return what offers the words that a value may be, or has the shell offer files or folders."""
+    """Return a function that offers a value's words, or has the shell offer files or folders."""
 
     def offered(
         ctx: click.Context, param: click.Parameter, incomplete: str
@@ -410,8 +410,8 @@ def _print(text: str) -> None:
         click.echo(text)
     except OSError as error:
         if error.errno == errno.EPIPE:
-            raise  # who reads it has seen enough: click ends the program
-        # What is left of it, Python would try to write once more when it ends.
+            raise  # the reader has closed the pipe: click ends the program
+        # At exit, Python would try once more to write the rest.
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
         raise OutputError(f"cannot write to standard output: {error.strerror or error}") from error
 

@@ -1,4 +1,4 @@
-"""What a running step is given: threads to work in, progress to report, the seed of samples."""
+"""The context of a running step: threads, progress, and the seed of random samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .memo import Memo
 from .packages import processors
 from .progress import SILENT, Progress
 
-# The most threads that may be asked for.
+# Largest number of threads.
 MOST_WORKERS = 256
 
 T = TypeVar("T")
@@ -21,7 +21,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Context:
-    """Where work runs, how it reports its progress, and what random samples start from.
+    """Where work runs, how it reports its progress, and the seed of its random samples.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ class Context:
     progress
         Receives the share of the work that is done, and holds whether it was cancelled.
     seed
-        Of random samples: the same seed gives the same result.
+        Seed of random samples: the same seed gives the same result.
     workers
         Number of threads of steps that keep threads of their own, as warping does.
     memo
-        Keeps what is made of the reference, where further images are registered to it; None: none
-        are.
+        Keeps results on the reference for further images that are registered to it; None: there
+        are none.
     """
 
     executor: Executor

@@ -44,7 +44,7 @@ class GridSizeError(GroundTieError, ValueError):
 
 
 class MemoryLimitError(GroundTieError, MemoryError):
-    """What was asked for does not fit into memory."""
+    """The request does not fit into memory."""
 
 
 class NoOverlapError(GroundTieError, ValueError):
@@ -84,7 +84,7 @@ class SchedulerError(GroundTieError, ConnectionError):
 
 
 class WorkerLostError(GroundTieError, ChildProcessError):
-    """The process that did the work was ended from outside, again and again."""
+    """The process that did the work was ended from outside, repeatedly."""
 
 
 class CancelledError(GroundTieError, RuntimeError):
@@ -92,7 +92,7 @@ class CancelledError(GroundTieError, RuntimeError):
 
 
 class Refusal(Protocol):
-    """What a refused registration's verdict states: see `registration.verdict.Verdict`."""
+    """The verdict of a refused registration: see `registration.verdict.Verdict`."""
 
     @property
     def rule(self) -> str: ...
@@ -116,7 +116,7 @@ class NotRegisteredError(GroundTieError, RuntimeError):
         self.tried = tried
 
     def summary(self) -> dict[str, Any]:
-        """Return what is known of the refusal as values that JSON can carry."""
+        """Return the facts of the refusal as JSON values."""
         values = {} if self.verdict is None else {"verdict": self.verdict.summary()}
         return values | ({"tried": list(self.tried)} if self.tried else {})
 
@@ -124,6 +124,6 @@ class NotRegisteredError(GroundTieError, RuntimeError):
 def raised_by(error: Exception, package: str) -> bool:
     """Return whether an exception's class is one of a package's own.
 
-    GDAL's errors pass through rasterio and fiona as classes that these keep to themselves.
+    rasterio and fiona pass on GDAL's errors as private classes.
     """
     return type(error).__module__.partition(".")[0] == package

@@ -1,6 +1,6 @@
 """Where many calls run: processes or threads of this machine, or a cluster's workers.
 
-All are `concurrent.futures.Executor`s, so that what runs on one runs on any.
+All are `concurrent.futures.Executor`s: a task that runs on one runs on any.
 """
 
 from __future__ import annotations
@@ -25,23 +25,24 @@ from .packages import use_one_thread
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# A scheduler answers within a network's round trip; a user waits no longer without a word.
+# Timeout of a scheduler, which answers within a network's round trip: users should not wait longer
+# without a message.
 _CONNECT_SECONDS = 5.0
 
-# So long the user's Cancel waits at most, while tasks run elsewhere.
+# Longest delay of the user's Cancel while tasks run elsewhere.
 POLL_SECONDS = 0.2
 
-# A worker that is killed may be a coincidence, twice with the same task is not.
+# A killed worker may be a coincidence; twice with the same task is not.
 _ATTEMPTS = 2
 
-# Of programs that start processes, which read them from their beginning.
+# Guard of programs that start processes, which read the program from its beginning.
 _GUARD = 'if __name__ == "__main__":'
 
 _here = threading.local()
 
 
 def stop_requested() -> bool:
-    """Whether the pool that runs the calling task is to end before its tasks are done."""
+    """Return whether the pool that runs the calling task is to end before its tasks are done."""
     stopped: Callable[[], bool] = getattr(_here, "stopped", lambda: False)
     return stopped()
 
@@ -52,9 +53,9 @@ class Threads(ThreadPoolExecutor):
     Parameters
     ----------
     workers
-        How many.
+        Number of threads.
     stop
-        What is set to ask them; None: an event of threads.
+        Event that asks tasks to stop; None: a `threading.Event`.
     """
 
     def __init__(self, workers: int, stop: Any = None) -> None:
@@ -69,10 +70,10 @@ class Threads(ThreadPoolExecutor):
 
 
 class Processes(Threads):
-    """Threads of which each has a process of its own: one that dies costs no other's task.
+    """Threads with a process of its own each, so that a dying process costs no other task.
 
-    It is known to have run the task by which it died: that task runs again in a new one. Nothing is
-    forked, as threads of OpenCV and GDAL do not survive it: modules that use this at import need
+    The task of a process that died is known, and runs again in a new process. Processes are not
+    forked, since threads of OpenCV and GDAL do not survive it: modules that use this at import need
     `if __name__ == "__main__"`.
     """
 
@@ -84,14 +85,14 @@ class Processes(Threads):
         self._pools: list[ProcessPoolExecutor] = []
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Have a task run by the next process that is free.
+        """Run a task in the next free process.
 
-        Its future raises `WorkerLostError` if its process dies again and again.
+        Its future raises `WorkerLostError` if its process dies repeatedly.
         """
         return super().submit(self._run, fn, *args, **kwargs)
 
     def _run(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        # Where none could begin, none is tried with each task until one has begun after all.
+        # If no process could start, tasks do not try another one until one has started after all.
         is_vain = self._have_none_begun.is_set() and not self._begun.is_set()
         for _ in range(0 if is_vain else _ATTEMPTS):
             try:
@@ -125,20 +126,20 @@ class Processes(Threads):
 
 @contextlib.contextmanager
 def open_executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
-    """Open what runs many calls, and end it afterwards.
+    """Open an executor of many calls, and end it afterwards.
 
     Parameters
     ----------
     workers
-        How many calls run at the same time on this machine: in processes, but in threads where
-        none can be started.
+        Number of calls run in parallel on this machine: in processes, or in threads if no process
+        can be started.
     scheduler
         Address of a Dask scheduler, as `tcp://host:8786`: its workers run the calls, all at once.
 
     Raises
     ------
     ParameterError
-        This process is being started itself, by a program that has no guard against that.
+        This process is itself being started, by a program without a guard.
     SchedulerError
         The scheduler does not answer, or Dask is missing.
     """
@@ -158,14 +159,14 @@ def open_executor(workers: int, scheduler: str | None = None) -> Iterator[Execut
 def _can_start_processes() -> bool:
     """Return whether this process can start others.
 
-    Not inside QGIS, whose Python is no interpreter that could be started, nor in a worker of
-    `multiprocessing.Pool` (a daemon), nor where the program was read from standard input or a
-    pipe: each process reads it.
+    It cannot inside QGIS, whose Python is no interpreter that could be started, in a worker of
+    `multiprocessing.Pool` (a daemon), or if the program was read from standard input or a pipe,
+    since each process reads it.
 
     Raises
     ------
     ParameterError
-        This process is reading the program in order to begin: what that does is not its task.
+        This process is itself being started, and must not do the program's work.
     """
     if "qgis.core" in sys.modules:
         return False
@@ -198,7 +199,7 @@ def _scheduler_executor(address: str) -> Iterator[Executor]:
         raise ParameterError(f"scheduler must be an address as tcp://host:8786, not {address!r}")
     try:
         client = distributed.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
-    except (OSError, ValueError, ImportError) as error:  # also of a protocol it does not know
+    except (OSError, ValueError, ImportError) as error:  # also for an unknown protocol
         raise SchedulerError(f"no Dask scheduler answers at {address}") from error
     with client:
         # Tasks are no pure functions: they write files.
@@ -206,12 +207,12 @@ def _scheduler_executor(address: str) -> Iterator[Executor]:
 
 
 def result_of(future: Future[T]) -> T:
-    """Return what a task that has ended returned.
+    """Return the result of a task that has ended.
 
     Raises
     ------
     WorkerLostError
-        The worker that ran it was lost. What the task raised is raised, too.
+        The worker that ran it was lost. Errors of the task itself are raised unchanged.
     SchedulerError
         The scheduler was lost.
     """
@@ -226,7 +227,7 @@ def result_of(future: Future[T]) -> T:
 
 
 def enter_worker() -> None:
-    """Prepare the process of a task that may run anywhere: that of a Dask worker."""
+    """Prepare the process of a task, which may run anywhere, if it is a Dask worker."""
     if "distributed" in sys.modules:
         set_heaps()
 
@@ -236,9 +237,9 @@ def _heed(stopped: Callable[[], bool]) -> None:
 
 
 def _start_worker(stop: Any, begun: Any) -> None:
-    """Prepare a process: one thread for libraries, and an end as soon as its parent's.
+    """Prepare a process: libraries use one thread, and the process ends with its parent.
 
-    A terminal's Ctrl-C reaches all processes: the parent alone decides what comes of it.
+    A terminal's Ctrl-C reaches all processes: the parent alone handles it.
     """
     begun.set()
     use_one_thread()

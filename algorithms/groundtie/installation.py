@@ -1,6 +1,6 @@
-"""What of GroundTie's surroundings is here: packages, GDAL, PROJ, geoids; and what cannot run.
+"""The installation that GroundTie runs in: packages, GDAL, PROJ, geoids; and what cannot run.
 
-Everything is tried, not only looked for: a package that is there may be broken.
+Everything is tried, not only looked for: an installed package may be broken.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .packages import PACKAGES, Package
 from .version import __version__
 
 OK, MISSING, OPTIONAL = "ok", "missing", "not here"
-# Formats that missions deliver, and those that are written.
+# Formats that missions deliver, and formats that are written.
 _FORMATS = ("GTiff", "COG", "JP2OpenJPEG", "NITF", "HDF5", "netCDF")
 # EPSG's own definition: the central meridian of UTM's zone 33 meets the equator there.
 _LON_LAT, _UTM_33 = (15.0, 0.0), (500_000.0, 0.0)
@@ -27,15 +27,15 @@ _WITH_HEIGHTS = ("orthorectify", "extract_gcps", "refine_rpc")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """The result of checking one component.
 
     Parameters
     ----------
     name
-        What it is.
+        Name of the component.
     state
-        `OK`, `MISSING` (or broken, or too old), or `OPTIONAL`: it is not here, and GroundTie is
-        whole without it.
+        `OK`, `MISSING` (or broken, or too old), or `OPTIONAL`: not installed, and GroundTie is
+        complete without it.
     text
         Version and place, or the reason.
     without
@@ -48,30 +48,30 @@ class Finding:
     without: tuple[str, ...] = ()
 
     def line(self) -> str:
-        """Return it as a line of text."""
+        """Return the finding as a line of text."""
         without = f"; without it: {', '.join(self.without)}" if self.without else ""
         return f"{self.state:<8}  {self.name}: {self.text}{without}"
 
 
 @dataclass(frozen=True)
 class Installation:
-    """All that was found."""
+    """All findings."""
 
     findings: tuple[Finding, ...]
     requirements: tuple[str, ...]
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of what is missing."""
+        """Names of the missing components."""
         return tuple(finding.name for finding in self.findings if finding.state == MISSING)
 
     @property
     def exit_code(self) -> int:
-        """2 where something is missing."""
+        """2 if something is missing."""
         return 2 if self.missing else 0
 
     def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
+        """Return the result as JSON values."""
         return {
             "missing": list(self.missing),
             "missing_count": len(self.missing),
@@ -95,21 +95,21 @@ class Installation:
 
 
 def examine() -> Installation:
-    """Look at everything."""
+    """Check all components."""
     packages = [(package, _package(package)) for package in PACKAGES]
     wanted = tuple(p.requirement for p, found in packages if found.state == MISSING)
     return Installation((*(found for _, found in packages), *_gdal()), wanted)
 
 
 def _package(package: Package) -> Finding:
-    """Import a package, and compare its version with what is needed."""
+    """Import a package, and compare its version with the required one."""
     without = _without(package)
     absent = OPTIONAL if package.use else MISSING
     if not package.found():
         return Finding(package.name, absent, "not installed", without)
     try:
         module = importlib.import_module(package.imported)
-    except Exception as error:  # what it is, is what was asked for
+    except Exception as error:  # any error is a finding
         return Finding(package.name, absent, f"broken: {_one_line(error)}", without)
     version = _version(package, module)
     if _numbers(version) < _numbers(package.oldest):
@@ -141,7 +141,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _gdal() -> list[Finding]:
-    """Try GDAL, PROJ and the geoids' grids; nothing where rasterio cannot be imported."""
+    """Try GDAL, PROJ and the geoids' grids; nothing if rasterio cannot be imported."""
     try:
         import rasterio
     except Exception:  # stated as the package's finding
@@ -156,7 +156,7 @@ def _gdal() -> list[Finding]:
 
 
 def _proj() -> Finding:
-    """Convert a place by codes of EPSG, for which PROJ reads its data."""
+    """Convert a position between EPSG codes, for which PROJ reads its data."""
     from rasterio.warp import transform
 
     try:

@@ -1,4 +1,4 @@
-"""Results that are asked for again and again, by what they are made of."""
+"""A cache of results by the content of the arrays that they are computed from."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ T = TypeVar("T")
 
 
 class Memo:
-    """Keeps results by the content of the arrays that they are made of.
+    """Keeps results by the content of the arrays that they are computed from.
 
-    Nothing need be known of where arrays come from: what is equal is the same. Once it is full,
-    nothing more is kept, and nothing is dropped: what is always asked for in one order would be
-    dropped just before it is asked for again.
+    The origin of arrays does not matter: equal arrays are the same. Once the cache is full, nothing
+    more is kept, and nothing is dropped: in a constant order of requests, results would be dropped
+    just before they are requested again.
 
     Parameters
     ----------
     most_bytes
-        How much the results may take.
+        Memory that the results may take.
     """
 
     def __init__(self, most_bytes: int) -> None:
@@ -35,11 +35,11 @@ class Memo:
         Parameters
         ----------
         make
-            Makes the result, of nothing but the arrays.
+            Computes the result from nothing but the arrays.
         size_bytes
-            How much the result takes.
+            Memory that the result takes.
         arrays
-            What it is made of: of always the same types.
+            The arrays, always of the same types.
         """
         key = blake2b()
         for array in arrays:

@@ -1,6 +1,6 @@
-"""The Python packages that GroundTie uses: what for, and whether they are here.
+"""The Python packages that GroundTie uses, their purpose, and whether they are installed.
 
-Nothing is imported from them, so that what is missing can be named.
+Nothing is imported from them, so that missing ones can be named.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ class Package:
     name
         Its name there.
     oldest
-        The oldest version that will do.
+        The oldest sufficient version.
     module
-        What is imported of it, where that has another name.
+        The imported module, if it has another name.
     debian
-        Debian's package, where that has another name than `python3-NAME`.
+        Debian's package, if it is not called `python3-NAME`.
     tools
-        The tools that need it; none, with no `files` either: all do.
+        The tools that need it; empty, with no `files` either: all do.
     files
         Endings of the files that need it.
     use
-        What else it is for, where GroundTie is whole without it.
+        Its optional purpose, if GroundTie is complete without it.
     extra
-        The extra of this package that brings it then.
+        The extra of this package that then installs it.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Package:
 
     @property
     def requirement(self) -> str:
-        """What pip is asked for."""
+        """The requirement for pip."""
         return f"{self.name}>={self.oldest}"
 
     @property
@@ -61,7 +61,7 @@ class Package:
         return not (self.tools or self.files or self.use)
 
     def found(self) -> bool:
-        """Whether its module is here; it may be broken."""
+        """Whether its module is installed; it may be broken."""
         return importlib.util.find_spec(self.imported) is not None
 
 
@@ -92,7 +92,7 @@ PACKAGES = (
 )
 
 
-# How many threads libraries of linear algebra start, and OpenCV.
+# Variables for the number of threads of linear algebra libraries, and of OpenCV.
 _THREADS_OF = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -102,24 +102,24 @@ _THREADS_OF = (
 
 
 def needed_for(tool: str, paths: Iterable[PurePath]) -> list[Package]:
-    """Return what a call of a tool needs besides: for itself, and for its files."""
+    """Return the further packages that a call of a tool needs: for the tool, and for its files."""
     endings = {path.suffix.lower() for path in paths}
     return [p for p in PACKAGES if tool in p.tools or endings.intersection(p.files)]
 
 
 def use_one_thread() -> None:
-    """Let libraries work in the calling thread, unless the environment states how many.
+    """Let libraries work in the calling thread, unless the environment states another number.
 
     For processes that do this package's work alone, before they import numpy and OpenCV, which
-    read this once. Their own threads are the parallel part: those of libraries would wait for work
-    in a busy loop. (Builds of OpenCV that share their threads, as Debian's, do not heed it.)
+    read the variables once. These processes work in parallel by threads of their own; threads of
+    libraries would wait in a busy loop. (OpenCV builds that share threads, as Debian's, ignore it.)
     """
     for name in _THREADS_OF:
         os.environ.setdefault(name, "1")
 
 
 def processors() -> int:
-    """Return how many processors this process may use; the machine may have more."""
+    """Return the number of processors that this process may use; the machine may have more."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,6 +1,6 @@
-"""What rasters are called: files on disk, GDAL's own names, and what lies on other machines.
+"""Names of rasters: files on disk, GDAL's own names, and files on other machines.
 
-The one place that tells them apart: whoever takes a raster asks here before it becomes a path.
+Only this module distinguishes them: code that takes a raster asks it before making a path.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from .runs import file_facts, unknown_facts
 # GDAL's own names, such as /vsizip/a.zip/b.tif or HDF5:"a.h5"://b; C:\\… is a path.
 _GDAL_NAME = re.compile(r"/vsi|[A-Za-z][\w+.-]+:")
 
-# GDAL's names of what lies in an archive, which may lie in another: the path follows.
+# GDAL's prefixes of files in an archive, which may lie in another archive; the path follows.
 _IN_ARCHIVE = re.compile(r"((?:/vsi(?:zip|tar|gzip|7z|rar)/)+)(.*)", re.S)
 
-# What stands between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one.
+# Separators between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one part.
 _PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
 # pathlib makes one slash of two.
 _URL = re.compile(r"(/vsicurl/)?(https?|ftp|s3|gs|az|abfss?|oss|file):/{1,2}(?=[^/]|/[^/])", re.I)
 
-# What reads a URL of each kind: GDAL's virtual file systems.
+# GDAL's virtual file systems that read each kind of URL.
 _FILE_SYSTEMS = {
     "http": "/vsicurl/http://",
     "https": "/vsicurl/https://",
@@ -41,35 +41,36 @@ _FILE_SYSTEMS = {
     "oss": "/vsioss/",
 }
 
-# Those that read over a network, also inside of others, as /vsizip//vsicurl/….
+# File systems that read over a network, also inside of others, as /vsizip//vsicurl/….
 _REMOTE = re.compile(
     r"/vsi(curl|s3|gs|az|adls|oss|swift|webhdfs|hdfs)(_streaming)?[/?]|\b(https?|ftp)://", re.I
 )
 
-# What holds RPCs beside a raster, in place of its suffix and in any case; GDAL takes the first.
+# Endings of RPC files beside a raster, in place of its suffix, in any case; GDAL takes the first.
 _RPC_ENDINGS = (".rpb", "_rpc.txt")
 
-# Rasters that may have them.
+# Suffixes of rasters that may have RPC files.
 _WITH_RPCS = (".tif", ".tiff", ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", ".til", ".vrt")
 
 
-# What GDAL places a GeoTIFF by that states no place itself, in place of its suffix and in any case.
+# Endings of files by which GDAL places a GeoTIFF without georeferencing, in place of its suffix and
+# in any case.
 _WORLD_ENDINGS = (".tfw", ".tifw", ".tiffw", ".wld", ".tab")
 
-# What never has one of these: tables, reports and stored transforms. Anything else might.
+# Suffixes of files that never have world files: tables, reports and stored transforms. Others may.
 _WITHOUT_WORLD_FILES = (".csv", ".json", ".geojson", ".gpkg", ".html", ".txt", ".xml", ".rpb")
 
-# What the table of a raster states; those of vector layers, of the same ending, do not.
+# Statement in the table of a raster, but not of a vector layer, which has the same ending.
 _TABLE_OF_RASTER = re.compile(rb'^\s*type\s+"?raster\b', re.I | re.M)
 _SEARCHED_BYTES = 10_000
 
 
 def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Path | str:
-    """Return what a name means: a `Path` of a file, or GDAL's own name as text.
+    """Return the meaning of a name: a `Path` of a file, or GDAL's own name as text.
 
-    URLs become GDAL's names, also those that pathlib has shortened: `https://…` is read by
-    `/vsicurl/`, `s3://…` by `/vsis3/`, and so on. A file of that very name comes first, in the
-    folder at which relative names begin: by default the working directory.
+    URLs become GDAL's names, also URLs that pathlib has shortened: `https://…` is read by
+    `/vsicurl/`, `s3://…` by `/vsis3/`, and so on. A file of exactly that name takes precedence.
+    Relative names begin at `folder`, by default the working directory.
     """
     text = os.fspath(value)
     if os.path.lexists(text if folder is None else folder / text):
@@ -77,13 +78,13 @@ def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Pa
     if url := _URL.match(text):
         kind, rest = url[2].lower(), text[url.end() :]
         return f"{_FILE_SYSTEMS[kind]}{rest}" if kind != "file" else Path(f"/{rest.lstrip('/')}")
-    # A path is what it states; only GDAL's virtual file systems look like one.
+    # A `Path` is a file, except that GDAL's virtual file systems look like one.
     is_text = isinstance(value, str) and is_gdal_name(text)
     return text if is_text or text.startswith("/vsi") else Path(text)
 
 
 def is_utf8(text: str) -> bool:
-    """Return whether UTF-8 can state a text: JSON and names of files may hold half a character."""
+    """Return whether a text can be UTF-8: JSON and file names may hold half a character."""
     try:
         text.encode("utf-8")
     except UnicodeEncodeError:
@@ -92,19 +93,19 @@ def is_utf8(text: str) -> bool:
 
 
 def require_possible(what: str, name: str) -> None:
-    """Raise an error for a name that no file has, or that no table of results could state.
+    """Raise an error for a name that no file can have, or that no table of results can hold.
 
     Parameters
     ----------
     what
-        What has the name, as the message begins.
+        The owner of the name, with which the message begins.
     name
         The name.
 
     Raises
     ------
     ParameterError
-        It cannot be a name.
+        The text cannot be a name.
     """
     if not is_utf8(name):
         raise ParameterError(f"{what} has a name that is not UTF-8: {name!a}")
@@ -113,7 +114,7 @@ def require_possible(what: str, name: str) -> None:
 
 
 def located(name: str, beside: Path | str) -> Path | str:
-    """Return what a name means that stands in a file, relative to where that file lies.
+    """Return the meaning of a name in a file, relative to that file's location.
 
     Raises
     ------
@@ -128,7 +129,7 @@ def located(name: str, beside: Path | str) -> Path | str:
         return beside.parent / found
     system, mark, path = beside.rpartition("://")
     folder = path.partition("?")[0].rpartition("/")[0]
-    # From the server's root where it begins with a slash.
+    # From the server's root if the name begins with a slash.
     start = folder.partition("/")[0] if mark and name.startswith("/") else folder
     return f"{system}{mark}{posixpath.normpath(f'{start}/{name}')}"
 
@@ -144,34 +145,34 @@ def is_remote(name: Path | str) -> bool:
 
 
 def in_archive(name: str) -> tuple[str, str]:
-    """Return GDAL's names of the archives that a raster lies in, and the path that follows.
+    """Return GDAL's prefix of the archives that a raster lies in, and the path that follows.
 
-    The first is empty for a raster that lies in none.
+    The prefix is empty for a raster outside of archives.
     """
     found = _IN_ARCHIVE.fullmatch(name)
     return (found[1], found[2]) if found else ("", name)
 
 
 def parts_of(name: str) -> list[str]:
-    """Return the parts of one of GDAL's names, such as `NETCDF:"a.nc":band`; one is the file."""
+    """Return the parts of a name of GDAL's, such as `NETCDF:"a.nc":band`; one part is the file."""
     return _PARTS.split(name)
 
 
 def local_files(name: str, folder: Path | str = "") -> list[Path]:
     """Return the files on disk that a raster's name refers to: itself, archives, containers.
 
-    Of what is read over a network, of folders and of what is not there these are none.
+    There are none for rasters read over a network, for folders, and for missing files.
 
     Parameters
     ----------
     name
         The name, as GDAL takes it.
     folder
-        Where relative names begin; by default the working directory.
+        Folder at which relative names begin; by default the working directory.
     """
     if is_remote(name):
         return []
-    # Also the whole: what is no path to GDAL's drivers may well be one.
+    # Also the whole name: it may be a path although it looks like a driver's name.
     paths = (in_archive(part)[1] for part in (name, *parts_of(name)))
     places = (Path(os.path.abspath(os.path.join(folder, path))) for path in paths if path)
     found = (file_on_the_way_to(place) for place in places)
@@ -179,15 +180,15 @@ def local_files(name: str, folder: Path | str = "") -> list[Path]:
 
 
 def file_on_the_way_to(path: Path) -> Path | None:
-    """Return the path or the first of those above it that is a file, as an archive is."""
+    """Return the path, or the first path above it, that is a file, such as an archive."""
     return next((one for one in (path, *path.parents) if os.path.isfile(one)), None)
 
 
 def facts_behind(name: Path | str) -> list[tuple[Any, ...]]:
     """Return place, size and time of the files that a raster's name refers to.
 
-    What is read over a network counts by its name. Where else there are none, nothing is known as
-    unchanged: these facts are never the same again.
+    A raster read over a network counts by its name. Without any file otherwise, the facts are
+    unique, so that the raster never counts as unchanged.
     """
     if is_remote(name):
         return [(str(name),)]
@@ -204,9 +205,9 @@ def file_name(name: Any) -> str:
 
 
 def rpc_files(path: Path, more: Path | None = None) -> list[Path]:
-    """Return the files beside a raster that GDAL prefers to RPCs in its tags, the first to all.
+    """Return the files beside a raster that GDAL prefers to RPCs in its tags, in that order.
 
-    Of a path that is no raster's there are none. `more` is a file that is yet to be written.
+    There are none for a path that is no raster's. `more` is a file that is yet to be written.
     """
     if path.suffix.lower() not in _WITH_RPCS:
         return []
@@ -219,19 +220,19 @@ def rpc_files(path: Path, more: Path | None = None) -> list[Path]:
 
 
 def is_rpc_file_of(path: Path, raster: Path) -> bool:
-    """Return whether a file lies beside a raster, and is called as its RPCs are."""
+    """Return whether a file lies beside a raster and has the name of its RPC file."""
     return _lies_beside(path, raster) and path.name.lower() in _rpc_names(raster)
 
 
 def is_only_raster_of_its_name(path: Path) -> bool:
-    """Return whether no other raster lies there that has the same RPC files."""
+    """Return whether no other raster in the folder has the same RPC files."""
     return _suffixes_beside(path).isdisjoint(_WITH_RPCS)
 
 
 def own_world_files(path: Path) -> list[Path]:
-    """Return the world files and tables beside a GeoTIFF that are nothing else's, too.
+    """Return the world files and tables beside a GeoTIFF that belong to no other file.
 
-    GDAL takes them for its georeferencing if it has none. Of other paths there are none.
+    GDAL takes them for its georeferencing if it has none. Other paths have none.
     """
     if path.suffix.lower() not in (".tif", ".tiff"):
         return []
@@ -253,7 +254,7 @@ def _is_of_raster(table: Path, raster: Path) -> bool:
 
 
 def _suffixes_beside(path: Path) -> set[str]:
-    """Return the endings of other files that are called as one, but for these, in lower case."""
+    """Return the endings, in lower case, of other files with the same stem."""
     others = (Path(name) for name in _names_beside(path) if name != path.name)
     return {other.suffix.lower() for other in others if other.stem.lower() == path.stem.lower()}
 
@@ -274,6 +275,6 @@ def _names_beside(path: Path) -> list[str]:
 
 
 def identity(name: Path | str) -> Hashable:
-    """Return what is the same for two names of one raster."""
+    """Return a key that is equal for two names of one raster."""
     found = raster_name(name)
     return found.resolve() if isinstance(found, Path) else found

@@ -1,7 +1,7 @@
-"""Tie points under a person's hands: switched off, moved, added, and fitted again at once.
+"""Tie points edited by hand: switched off, moved, added, and fitted again at once.
 
-What a person moved or added is marked as edited in files and results. Check points stay check
-points: no fit sees them, whatever is done to them.
+Points that a person moved or added are marked as edited in files and results. Check points stay
+check points: no fit uses them, however they are edited.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from .steps import similarity_surface
 
 SWITCHED_OFF = "rejected: by a person"
 
-# A spline's system grows with the cube of its points: with more, none is offered
+# The cost of a spline grows with the cube of its points: with more, none is offered
 # (tests/test_review.py holds all other models of 2000 points to the time of a refit).
 MOST_SPLINE_POINTS = 300
 
@@ -57,11 +57,11 @@ class ModelFit:
     kind
         One of `geometry.models.KINDS`.
     transform
-        What was fitted.
+        The fitted transform.
     residuals_px
         Residuals of all points, shape (n,), in input pixels.
     left_out_px
-        Root mean square error of points at models that have not seen their block; None: too few.
+        Root mean square error of points by models fitted without their block; None: too few.
     """
 
     kind: str
@@ -72,7 +72,7 @@ class ModelFit:
 
 @dataclass(frozen=True)
 class Review:
-    """Tie points of an input raster, as they are now; every change makes another one.
+    """Tie points of an input raster in their present state; every change makes a new review.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Review:
 
     @property
     def _columns(self) -> dict[str, FloatArray]:
-        """The points' further columns, with a new one of what was edited."""
+        """The points' further columns, with a new one that marks edited points."""
         return {**self.points.more, EDITED: self.points.edited.astype(float)}
 
     @property
@@ -133,7 +133,7 @@ class Review:
                 moved[name][index] = place
         more = self._columns
         more[EDITED][index] = 1.0
-        if HEIGHT in more and reference_xy is not None:  # the ground has another one there
+        if HEIGHT in more and reference_xy is not None:  # the ground there has another height
             more[HEIGHT] = more[HEIGHT].copy()
             more[HEIGHT][index] = np.nan
         return replace(self, points=replace(self.points, **moved, more=more))
@@ -153,7 +153,7 @@ class Review:
         Raises
         ------
         TooFewPointsError
-            They are fewer than the model needs.
+            There are fewer points than the model needs.
         """
         evidence = TiePointEvidence.of(self.points, kind, self.input_grid)
         residuals_px = evidence.residuals_px(evidence.transform)
@@ -165,7 +165,7 @@ class Review:
         Raises
         ------
         TooFewPointsError
-            They are fewer than the model needs.
+            There are fewer points than the model needs.
         """
         return decide(TiePointEvidence.of(self.points, kind, self.input_grid)).reason
 
@@ -184,18 +184,18 @@ class Review:
         return found
 
     def worst(self, residuals_px: FloatArray) -> NDArray[np.int_]:
-        """Return the indices of used points by falling residual."""
+        """Return the indices of used points by decreasing residual."""
         used = np.flatnonzero(self.points.used)
         return used[np.argsort(-residuals_px[used], kind="stable")]
 
     def write(self, path: Path, transform: Transform) -> None:
-        """Write the points, for `warp` or to go on with later."""
+        """Write the points, for `warp` or for a later review."""
         points = replace(self.points, more=self._columns)
         with Outputs() as outputs:
             write_tie_points(outputs.stage(path), points, transform)
 
     def _left_out_px(self, kind: str) -> float | None:
-        """Return the error at points that a model has not seen, block by block of neighbours."""
+        """Return the error at points left out of the fit, block by block of neighbours."""
         taken = np.flatnonzero(self.points.fit)
         errors = np.full(len(taken), np.nan)
         for block in left_out_blocks(self.points.reference_xy[taken]):
@@ -221,9 +221,9 @@ def of_sensor_image(
     Parameters
     ----------
     reference
-        The reference, whose map it is.
+        The reference, which gives the map.
     image, rpc, dem, datum
-        The image, its RPCs, a terrain model and what its heights count from.
+        The image, its RPCs, a terrain model and its vertical datum.
     path
         Ground control; None: there is none yet.
 
@@ -245,16 +245,16 @@ def of_sensor_image(
 def refine_click(
     reference: Any, input: Any, reference_xy: ArrayLike, input_px: ArrayLike, transform: Transform
 ) -> tuple[FloatArray, Peak]:
-    """Return where in the input the surroundings of a clicked pair match best, and the peak.
+    """Return the input position at which a clicked pair's surroundings match best, and the peak.
 
     Parameters
     ----------
     reference, input
         The images, as `rasters.reading.open_raster` takes them.
     reference_xy, input_px
-        What a person clicked: position on the reference map, pixel (col, row) of the input.
+        The clicked pair: position on the reference map, pixel (col, row) of the input.
     transform
-        How the images lie to each other around there: rotation and scale are taken from it.
+        Relation of the images around the pair: rotation and scale are taken from it.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def refine_click(
         grid = one.grid if factor < 1.01 else one.grid.scaled(factor)
         side = _CHIP_PX + 2 * (_CLICK_PX + BORDER_PX) + 1
         here = grid.map_to_pixel(xy).ravel()
-        # A grid of the reference's pixels whose middle is the clicked place.
+        # A grid of the reference's pixels, centred on the clicked position.
         corner = Affine.translation(*(here + 0.5 - side / 2))
         around = grid.on_same_map(compose(grid.transform, corner), side, side)
         middle = (side - 1) / 2

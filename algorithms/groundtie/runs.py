@@ -1,7 +1,7 @@
-"""The call of a tool that is running: the id that all its files carry, and what it has made.
+"""The running call of a tool: the id that all its files carry, and the files that it has made.
 
-The id stands for what decides what they hold: tool, version, parameters, and name, size and time of
-the files that are read. The same call on the same files has the same id, with any number of
+The id is a digest of all that determines the results: tool, version, parameters, and name, size and
+time of the files that are read. The same call on the same files has the same id, with any number of
 workers, so that its files are the same, too.
 """
 
@@ -33,9 +33,9 @@ class RunningCall:
     run
         Its id.
     folders
-        Those that it made, each after that which it lies in.
+        Folders that it made, each after its parent.
     files
-        Those that it wrote, and those of an earlier call that it left as they are.
+        Files that it wrote, and files of an earlier call that it left as they are.
     """
 
     run: str
@@ -48,9 +48,9 @@ _current: ContextVar[RunningCall | None] = ContextVar("groundtie_call", default=
 
 @contextmanager
 def running(run: str) -> Iterator[RunningCall]:
-    """Let what is written carry an id, and no folder stay that was made and is empty at the end.
+    """Give written files an id, and remove folders that were made and are empty at the end.
 
-    A step of a call that has an id is a part of that call.
+    Within a running call, a step is a part of that call.
     """
     outer = _current.get()
     if outer is not None:
@@ -63,12 +63,12 @@ def running(run: str) -> Iterator[RunningCall]:
     finally:
         _current.reset(token)
         for folder in reversed(call.folders):
-            with suppress(OSError):  # it has something in it, or could not be made
+            with suppress(OSError):  # the folder is not empty, or could not be made
                 folder.rmdir()
 
 
 def will_make(folder: Path) -> None:
-    """Note which of a folder, and of those that it lies in, the running call is about to make."""
+    """Note which folders, of a folder and its parents, the running call is about to make."""
     call = _current.get()
     if call is not None:
         above = [Path(folder), *Path(folder).absolute().parents]
@@ -88,22 +88,22 @@ def run_of_call(tool: str, inputs: Mapping[str, Any]) -> str:
     Parameters
     ----------
     tool
-        Its name.
+        The tool's name.
     inputs
-        Checked values by name of what decides the results: neither outputs nor workers. With a
-        raster in memory no other call has the same id.
+        Checked values, by name, of the parameters that determine the results: neither outputs nor
+        workers. With a raster in memory, the id is unique.
     """
     facts = {name: _facts(value) for name, value in sorted(inputs.items())}
     return digest(tool, __version__, facts)
 
 
 def digest(*facts: Any) -> str:
-    """Return what stands for facts, by what `repr` shows of them."""
+    """Return a digest of the `repr` of facts."""
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
 
 def run_tags(name: str = RUN) -> dict[str, str]:
-    """Return the id of the call that is running, by a name; empty outside of a tool's call."""
+    """Return the id of the running call, by a name; empty outside of a tool's call."""
     call = _current.get()
     return {} if call is None else {name: call.run}
 
@@ -112,19 +112,19 @@ def file_state(path: Path | str) -> tuple[int, int] | None:
     """Return size in bytes, and time of the last change in nanoseconds; None: there is no file."""
     try:
         found = os.stat(path)
-    except (OSError, ValueError):  # also of what cannot be a name
+    except (OSError, ValueError):  # also for a text that cannot be a name
         return None
     return found.st_size, found.st_mtime_ns
 
 
 def file_facts(path: Path | str) -> tuple[Any, ...]:
-    """Return place, size and time of a file, from whatever folder it is named; else the name."""
+    """Return absolute path, size and time of a file; if there is no file, its name."""
     state = file_state(path)
     return (str(path),) if state is None else (os.path.abspath(path), *state)
 
 
 def unknown_facts(name: Path | str) -> tuple[str, str]:
-    """Return facts of what may have changed without a trace: no others are the same."""
+    """Return unique facts of a raster or file that may have changed without a trace."""
     return str(name), secrets.token_hex(8)
 
 

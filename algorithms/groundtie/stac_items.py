@@ -1,6 +1,6 @@
-"""STAC items as inputs: local JSON or over HTTP, of which an asset is a raster.
+"""STAC items as inputs: JSON, local or over HTTP, with rasters as assets.
 
-Plain JSON is read, of any version of STAC: what is needed has not changed since 1.0
+Items are read as plain JSON, of any version of STAC: the needed members have not changed since 1.0
 (https://github.com/radiantearth/stac-spec).
 """
 
@@ -22,7 +22,7 @@ from .strict_json import parse_json
 _DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 _YEAR = re.compile(r"(?<!\d)((?:19|20)\d\d)(?!\d)")
 
-# ISO 8601, its signs between numbers all there or all left out.
+# ISO 8601, with all separators between numbers or none.
 _MONTH = re.compile(r"\d{4}(-\d\d)?", re.ASCII)
 _TIME = re.compile(
     r"(?P<year>\d{4})(?P<dash>-?)(?P<month>\d\d)(?P=dash)(?P<day>\d\d)"
@@ -35,10 +35,10 @@ _UNITS = ("year", "month", "day", "hour", "minute", "second")
 
 SUFFIXES = (".json", ".geojson")
 
-# Of files that are rasters, whatever an item states of their type.
+# Suffixes of files that are rasters, whatever type an item states.
 RASTER_SUFFIXES = (".tif", ".tiff", ".jp2", ".vrt", ".img")
 
-# A server that is silent for so long does not answer any more.
+# Timeout of a silent server.
 SILENT_SECONDS = 30
 
 
@@ -49,13 +49,13 @@ class StacItem:
     Parameters
     ----------
     id
-        What it is called.
+        The item's id.
     time
-        When it was taken, as it states it; None: not stated.
+        Time of acquisition as stated; None: not stated.
     assets
-        What it has, by name.
+        The item's assets by name.
     place
-        Where the JSON lies.
+        Place of the JSON.
     """
 
     id: str
@@ -84,9 +84,9 @@ class StacItem:
 
 
 def place_of_asset(asset: Mapping[str, Any], place: Path | str) -> Path | str:
-    """Return where an asset of an item at `place` lies: a file, or GDAL's name of it.
+    """Return the place of an asset of an item at `place`: a file, or GDAL's name of it.
 
-    Catalogues state URLs, in which a file's name is percent-encoded, but many do not encode it.
+    Catalogues state URLs. File names in them should be percent-encoded, but often are not.
 
     Raises
     ------
@@ -102,12 +102,12 @@ def place_of_asset(asset: Mapping[str, Any], place: Path | str) -> Path | str:
 
 
 def is_item(name: Path | str) -> bool:
-    """Return whether a name is one of JSON, with an asset of it or without."""
+    """Return whether a name is that of a JSON file, with an asset or without."""
     return Path(file_name(_split(name)[0])).suffix.lower() in SUFFIXES
 
 
 def raster_of_item(name: Path | str) -> Path | str:
-    """Return what `item.json#asset`, or `item.json` with one raster, stands for; others as is.
+    """Return the raster of `item.json#asset`, or of `item.json` with one raster; other names as is.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def raster_of_item(name: Path | str) -> Path | str:
         The item cannot be read, is one of several, or has no such asset.
     """
     if not is_item(name) or (isinstance(name, Path) and "#" not in name.name and not name.exists()):
-        return name  # a file that is not there is none of a catalogue
+        return name  # a missing file is no item
     items, asset = read_items(name)
     if len(items) != 1:
         raise ParameterError(f"{name} has {len(items)} items; one is needed")
@@ -128,7 +128,7 @@ def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
     Raises
     ------
     ParameterError
-        It cannot be read, or is no STAC item or item collection.
+        The file cannot be read, or is no STAC item or item collection.
     """
     place, asset = _split(name)
     try:
@@ -152,7 +152,7 @@ def _item(place: Path | str, item: Mapping[str, Any]) -> StacItem:
 
 
 def _split(name: Path | str) -> tuple[Path | str, str | None]:
-    """Return a name without the asset behind its #, and that."""
+    """Return a name without the asset after its #, and the asset."""
     text, mark, asset = str(name).rpartition("#")
     if not mark or (isinstance(name, Path) and name.exists()):
         return name, None
@@ -169,14 +169,14 @@ def _read(place: Path | str) -> bytes:
 
 
 def _download(url: str) -> bytes:
-    """Return what lies at a URL.
+    """Return the content of a URL.
 
     Raises
     ------
     OSError
-        It cannot be read.
+        The URL cannot be read.
     """
-    # They take longer to import than a file to read, and all tools import this module.
+    # These take longer to import than a file to read, and all tools import this module.
     import http.client
     import urllib.error
     import urllib.request
@@ -198,9 +198,9 @@ def _is_raster(asset: Mapping[str, Any]) -> bool:
 
 
 def stated_time(text: str) -> datetime.datetime | None:
-    """Return the time that a text is, in UTC: ISO 8601, down to a year; None: it is none.
+    """Return the time, in UTC, of a text in ISO 8601, at least a year; None: it is no time.
 
-    Here and not by Python's own reader, of which each version takes other texts.
+    Python's own parser is not used, because its versions accept different texts.
     """
     text = text.strip()
     if _MONTH.fullmatch(text):
@@ -219,12 +219,12 @@ def stated_time(text: str) -> datetime.datetime | None:
 
 
 def time_of(name: str) -> datetime.datetime | None:
-    """Return the time that a file's name states: the whole of it, or a day or a year in it."""
+    """Return the time in a file's name: the whole name, or a day or a year in it."""
     day = _DAY.search(name)
     if day is None:
         year = _YEAR.search(name)
         return None if year is None else datetime.datetime(int(year.group(1)), 1, 1)
-    # Before the time of day, names mostly have another sign than ISO 8601 has.
+    # Before the time of day, most names have another separator than ISO 8601.
     stated = stated_time(name) or stated_time(name.replace("_", "T", 1))
     try:
         return stated or datetime.datetime(*map(int, day.groups()))  # type: ignore[arg-type]

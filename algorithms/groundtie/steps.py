@@ -1,8 +1,8 @@
 """The steps of a registration, one by one, on arrays.
 
-What `coregister` does in one call can be done step by step, or in part: the similarity surface of
-two windows, the peak of a surface, tie points of two images near a model, a robust fit to points,
-the verdict on a model. Images are whatever the tools take: arrays, files, open datasets.
+The steps of `coregister` can be done one by one, or in part: the similarity surface of two windows,
+the peak of a surface, tie points of two images near a model, a robust fit to points, the verdict on
+a model. Images are given as to the tools: arrays, files, open datasets.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ __all__ = [
 ]
 
 
-# Matches are taken to be as exact as this, in pixels, where no better value is given.
+# Assumed standard deviation of matches, in pixels, if no better value is given.
 _USUAL_SIGMA_PX = 0.25
 
 _RADIUS = Number(help="Largest shift.", unit="px", minimum=0, integer=True)
-# With none, a surface has no peak inside.
+# With a radius of 0, a surface has no peak inside.
 _MATCH_RADIUS = replace(_RADIUS, minimum=1)
 _REACH = replace(_RADIUS, integer=False)
 _SIZE = Number(help="Size, above 0.", minimum=0)
@@ -68,14 +68,14 @@ _SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
 def similarity_surface(
     reference: ArrayLike, input: ArrayLike, radius_px: int, similarity: str = "fused"
 ) -> Surface:
-    """Return how similar two windows are, over shifts of one against the other.
+    """Return the similarity of two windows over shifts of one against the other.
 
     Parameters
     ----------
     reference, input
-        Grey values of the same size, (h, w), of nominally the same ground. What is masked or not
-        finite does not count. A border of `radius_px` + 8 pixels is not part of the chip that is
-        compared.
+        Grey values of the same size, (h, w), of nominally the same ground. Masked pixels and pixels
+        that are not finite do not count. A border of `radius_px` + 8 pixels is not part of the chip
+        that is compared.
     radius_px
         Largest shift.
     similarity
@@ -83,9 +83,9 @@ def similarity_surface(
 
     Returns
     -------
-    Shape (2 `radius_px` + 1, 2 `radius_px` + 1), in robust standard deviations: rows and columns
-    by which the input's content lies further down and right than the reference's. It is 0 where
-    one of them is constant.
+    Shape (2 `radius_px` + 1, 2 `radius_px` + 1), in robust standard deviations. Rows and columns
+    are shifts, down and right, of the input's content from the reference's. The surface is 0 if one
+    of the windows is constant.
 
     Raises
     ------
@@ -104,7 +104,8 @@ def similarity_surface(
         raise ParameterError(f"windows must have {least} pixels a side for a radius of {radius_px}")
     compared = windows[0].inner(radius_px + BORDER_PX), windows[1].inner(BORDER_PX)
     if any(window.is_flat for window in compared):
-        # Its mutual information is nothing but rounding, of which a peak would be made.
+        # The mutual information of a constant window is rounding noise, in which a peak would be
+        # found.
         return np.zeros((2 * radius_px + 1,) * 2, np.float32)
     settings = SimilaritySettings(similarity)
     template, search = (describe(w, chip_pixels[0] * chip_pixels[1], settings) for w in windows)
@@ -117,13 +118,13 @@ def find_peak(surface: ArrayLike) -> Peak:
     Parameters
     ----------
     surface
-        As of `similarity_surface`, shape (2 r + 1, 2 q + 1), shift 0 in its middle; 0, the
-        background's value, where nothing is known.
+        As of `similarity_surface`, shape (2 r + 1, 2 q + 1), shift 0 at its centre; unknown values
+        are 0, the background's value.
 
     Raises
     ------
     ParameterError
-        It has no middle, or holds what is no finite number.
+        The surface has no centre, or holds values that are not finite numbers.
     """
     values = np.asarray(surface)
     if values.ndim != 2 or 0 in np.mod(values.shape, 2):
@@ -145,7 +146,7 @@ def match_chips(
 ) -> TiePoints:
     """Return tie points of two images near a model.
 
-    Chips lie between the blocks that are held out for `judge`, and see nothing of them.
+    Chips lie between the blocks that are held out for `judge`, and use no pixel of them.
 
     Parameters
     ----------
@@ -154,8 +155,8 @@ def match_chips(
     model
         The misregistration on the map as known so far; None: none.
     radius_px
-        How far it may be wrong, in matching pixels. All shifts of each chip are compared: time
-        grows with its square. What lies far off is searched for by `coregister`.
+        Largest error of the model, in matching pixels. All shifts of each chip are compared: time
+        grows with the square of the radius. For larger errors, use the search of `coregister`.
     spec
         How chips are laid out, masked and compared.
     context
@@ -164,7 +165,7 @@ def match_chips(
     Raises
     ------
     ParameterError
-        The radius is no whole number from 1 on, or something is of another type.
+        The radius is no whole number of at least 1, or an argument has a wrong type.
     """
     model = shift_model(0.0, 0.0) if model is None else model
     _require("model", model, Model)
@@ -183,7 +184,8 @@ class Fit:
     Parameters
     ----------
     model
-        Takes positions of the reference to nominal ones of the input; `model.inverse` back.
+        Maps positions of the reference to nominal positions of the input; `model.inverse` maps
+        back.
     inliers
         Which pairs it was fitted to, shape (n,).
     sigma
@@ -205,7 +207,7 @@ def fit_model(
     radius_px: float = FIT_RADIUS_PX,
     seed: int = 0,
 ) -> Fit:
-    """Fit a model to pairs of positions of which many may be outliers.
+    """Fit a model to pairs of positions, many of which may be outliers.
 
     Parameters
     ----------
@@ -217,11 +219,11 @@ def fit_model(
     pixel_size
         Size of a pixel in units of the positions.
     tolerance_px
-        Within which pairs agree with a first model of degree 1, their consensus.
+        Largest residual of pairs that agree with a first model of degree 1, their consensus.
     radius_px
-        How far outliers may have fallen from the truth.
+        Largest distance of outliers from the truth.
     seed
-        Of the consensus' random samples.
+        Seed of the consensus' random samples.
 
     Raises
     ------
@@ -229,8 +231,8 @@ def fit_model(
         There is no such kind of model, the positions are no pairs of finite numbers, or a number is
         out of its range.
     TooFewPointsError
-        Too few pairs agree with a model of this kind, or those that do lie so that they do not
-        determine it: at one place, or on a line.
+        Too few pairs agree with a model of this kind, or those that do cannot determine it: they
+        lie at one place, or on a line.
     """
     kind = _KIND.check("kind", kind)
     pixel_size = _above_0("pixel_size", pixel_size)
@@ -250,7 +252,7 @@ def fit_model(
     if len(px) < 3:
         raise TooFewPointsError(f"a robust fit needs at least 3 points; there are {len(px)}")
     require_determined(kind, px)
-    # A person's own points may be of images of any rotation and scale.
+    # A user's own points may be those of images of any rotation and scale.
     start = find_consensus(px, nominal_px, tolerance_px, kind, seed, np.inf)
     model, mixture = fit_robustly(
         kind,
@@ -262,7 +264,7 @@ def fit_model(
     )
     require_determined(kind, px[mixture.inliers])
     residuals = (nominal_px - model(px))[mixture.inliers]
-    # The mixture's own is kept within what matches have.
+    # The mixture's own sigma is clipped to the usual range of matches.
     sigma = float(np.sqrt((residuals**2).mean())) * pixel_size
     return Fit(model.on_map(Affine.scale(pixel_size)), mixture.inliers, sigma)
 
@@ -277,8 +279,8 @@ def judge(
 ) -> Verdict:
     """Return the verdict on a model, wherever it comes from, by chips in held-out blocks.
 
-    All rules of a registration apply. They rest on the model having seen nothing of those blocks,
-    as the points of `match_chips` have not.
+    All rules of a registration apply. They require a model that was fitted without those blocks, as
+    with points of `match_chips`.
 
     Parameters
     ----------
@@ -289,14 +291,14 @@ def judge(
     points
         The points that it was fitted to, outliers rejected (see `TiePoints.reject`).
     spec
-        How the images are inspected, masked and compared, and the largest error that is accepted.
+        How the images are inspected, masked and compared, and the largest accepted error.
     context
         Threads and progress; None: a thread for each processor.
 
     Raises
     ------
     ParameterError
-        Something is of another type.
+        An argument has a wrong type.
     """
     _require("model", model, Model)
     _require("points", points, TiePoints)

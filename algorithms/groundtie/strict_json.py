@@ -1,7 +1,7 @@
-"""JSON from files that anybody may have written: what is no plain JSON is an error, not a surprise.
+"""Strict JSON from files of any origin: anything but plain JSON is an error.
 
-Python reads more than JSON: infinity and NaN, and whole numbers of any length, which become
-neither a float nor the size of an array.
+Python reads more than JSON: infinity and NaN, and whole numbers of any length, which can be neither
+a float nor the size of an array.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 
 def read_json(path: Path, *, keeps_digits: bool = False) -> Any:
-    """Return what a JSON file holds; all of its numbers are finite.
+    """Return the content of a JSON file; all of its numbers are finite.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def read_json(path: Path, *, keeps_digits: bool = False) -> Any:
 
 
 def read_json_lines(path: Path, *, keeps_digits: bool = False) -> Iterator[Any]:
-    """Yield what each line of a file states.
+    """Yield the content of each line of a file.
 
-    Of lines that are no JSON, as the last one of a program that was killed, nothing is taken; a
-    file that cannot be read has no lines.
+    Lines that are no JSON are skipped, as the last one of a program that was killed. A file that
+    cannot be read has no lines.
 
     Parameters
     ----------
@@ -54,14 +54,14 @@ def read_json_lines(path: Path, *, keeps_digits: bool = False) -> Iterator[Any]:
 
 
 def parse_json(content: bytes, *, keeps_digits: bool = False) -> Any:
-    """Return what JSON in UTF-8 states; all of its numbers are finite.
+    """Return the content of JSON in UTF-8; all of its numbers are finite.
 
     Parameters
     ----------
     content
         The JSON.
     keeps_digits
-        Whole numbers keep all digits, as those that are names must; else long ones become floats.
+        Whether whole numbers keep all digits, as names must; otherwise long ones become floats.
 
     Raises
     ------
@@ -87,10 +87,10 @@ def _finite(text: str) -> float:
 
 
 def _whole(text: str) -> int | float:
-    # A float has 15 digits; whole numbers beyond count nothing.
+    # A float has 15 digits; longer whole numbers are no counts.
     return int(text) if len(text) <= 15 else _finite(text)
 
 
 def _exact(text: str) -> int:
-    _finite(text)  # beyond is nobody's number, nor is it short enough for a name
+    _finite(text)  # numbers beyond a float are no values, and too long for a name
     return int(text)

@@ -19,7 +19,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """Return the rows of a table, by the names of their columns; empty cells are left out.
 
     CSV has the names in its first line. JSON and YAML hold a list of rows, or `rows` beside
-    `defaults`, which count where a row has no value of its own.
+    `defaults`, which apply where a row has no value of its own.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def plain_number(value: Any) -> float:
-    """Return the number that a cell holds, which other programs read alike.
+    """Return the number in a cell, as other programs read it, too.
 
     Raises
     ------
     TypeError, ValueError
-        It holds none; Python alone takes `1_000`, and digits of other scripts, for numbers.
+        The cell holds no number. `1_000` and digits of other scripts are numbers in Python alone.
     """
     if isinstance(value, str) and ("_" in value or not value.isascii()):
         raise ValueError(f"{value!r} is no number")
@@ -52,22 +52,22 @@ def plain_number(value: Any) -> float:
 def csv_rows(
     lines: Iterable[str], column: Callable[[str], str] = str
 ) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the names of a CSV table's columns, and its rows by these.
+    """Return the names of a CSV table's columns, and its rows by these names.
 
     Parameters
     ----------
     lines
         The table; its first line has the names.
     column
-        Returns what a name stands for.
+        Returns the name of a column by that in the first line.
 
     Raises
     ------
     ValueError
-        A name stands twice, or a row has more fields than the first line, other than empty ones.
+        A name occurs twice, or a row has more fields, that are not empty, than the first line.
     """
     held = list(lines)
-    # Spreadsheets write semicolons where a comma is the decimal sign.
+    # Spreadsheets write semicolons if a comma is the decimal sign.
     delimiter = max(_DELIMITERS, key=held[0].count) if held else ","
     reader = csv.DictReader(held, delimiter=delimiter)
     rows, names = list(reader), [column(name) for name in reader.fieldnames or () if name]
@@ -89,7 +89,7 @@ def _read_csv(path: Path) -> list[dict[str, Any]]:
 
 def _read_nested(path: Path) -> list[dict[str, Any]]:
     is_json = path.suffix.lower() == ".json"
-    # A name may be a number, as of a time to the microsecond.
+    # A name may be a number of many digits, as a time to the microsecond.
     held: Any = read_json(path, keeps_digits=True) if is_json else _read_yaml(path)
     defaults: Any = {}
     if isinstance(held, dict):
@@ -121,5 +121,5 @@ def _filled(row: dict[Any, Any]) -> dict[str, Any]:
 
 
 def _column(name: Any) -> str:
-    """Return a parameter's name as Python has it, of a column's as the command line has it."""
+    """Return a parameter's name in Python by a column's name, as on the command line."""
     return str(name).strip().lstrip("-").replace("-", "_")

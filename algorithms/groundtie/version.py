@@ -27,12 +27,12 @@ def find_version(package: Path) -> str:
     importlib.metadata.PackageNotFoundError
         If there is no ``metadata.txt`` and nothing is installed.
     """
-    # The file goes first: another version may be installed beside a checkout or a plugin.
+    # The file takes precedence: another version may be installed beside a checkout or a plugin.
     for folder in (package.parent, package.parent.parent):
         version = _read(folder / "metadata.txt")
         if version is not None:
             return version
-    from importlib import metadata  # a third of the command line's start, and hardly ever needed
+    from importlib import metadata  # a third of the command line's start, and rarely needed
 
     return metadata.version("groundtie")
 

@@ -1,4 +1,4 @@
-"""What GDAL's virtual rasters are made of: read from the files, without GDAL."""
+"""The sources of GDAL's virtual rasters, read from the files without GDAL."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from xml.etree import ElementTree
 
 from .raster_names import is_gdal_name, local_files
 
-# What a virtual raster begins with, whatever its file is called.
+# Beginning of a virtual raster, whatever its file is called.
 _START = b"<VRTDataset"
 _SEARCHED_BYTES = 1024
 
-# What names a source, in any case: of mosaics, bands and overviews, and of what is warped.
+# Elements that name a source, in any case: of mosaics, bands, overviews and warped rasters.
 _SOURCES = ("sourcefilename", "sourcedataset")
 
 
 def sources_of(path: Path) -> list[Path]:
-    """Return the files that a virtual raster is made of, and those that these are made of.
+    """Return the sources of a virtual raster, and the sources of these.
 
-    GDAL, which is not asked, names the first ones alone; other rasters are made of none. Links are
-    followed, as GDAL does before it takes a name relative to the virtual raster.
+    GDAL, which is not asked, would name only the direct sources. Other rasters have none. Links are
+    followed, as GDAL does before it resolves a name relative to the virtual raster.
     """
     try:
         own = path.resolve()
@@ -42,7 +42,7 @@ def _named_in(path: Path) -> list[Path]:
         sources = [one for one in root.iter() if one.tag.lower() in _SOURCES and one.text]
         return [place.resolve() for one in sources for place in _places(one, path.parent)]
     except (OSError, RuntimeError, ElementTree.ParseError, ValueError, LookupError):
-        return []  # damaged, of an encoding that nobody knows, or a loop of links
+        return []  # damaged, of an unknown encoding, or a loop of links
 
 
 def _is_virtual(path: Path) -> bool:
@@ -53,11 +53,11 @@ def _is_virtual(path: Path) -> bool:
 
 
 def _places(source: ElementTree.Element, folder: Path) -> list[Path]:
-    """Return where a source lies: its file, or those that one of GDAL's names refers to."""
+    """Return the places of a source: its file, or the files that a name of GDAL's refers to."""
     name = str(source.text)
     is_relative = {key.lower(): word for key, word in source.items()}.get("relativetovrt") == "1"
     place = folder / name if is_relative else Path(name)
     if place.exists() or not is_gdal_name(name):
         return [place]
-    # What stays unknown has the name, where no file is.
+    # A source without a known file keeps its name as a path.
     return local_files(name, folder if is_relative else "") or [place]

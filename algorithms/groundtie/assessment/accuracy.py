@@ -1,8 +1,7 @@
-"""What was measured of a registration, and the verdict on it.
+"""The measured accuracy of a registration, and the verdict on it.
 
-Errors at control points only show how well the model takes up the points that it was fitted to;
-errors at test points, which took no part in the fit, show how good it is. Source: [Suri2010],
-section 2.5.3.
+Errors at control points only show how well the model fits the points that it was fitted to. Errors
+at test points, which took no part in the fit, show its accuracy. Source: [Suri2010], section 2.5.3.
 """
 
 from __future__ import annotations
@@ -21,20 +20,20 @@ from .point_errors import PointErrors
 
 @dataclass(frozen=True)
 class AssessmentEvidence:
-    """What the rules read of a registration that was made before.
+    """The rules' evidence on an existing registration.
 
     Parameters
     ----------
     name
-        What the points are called.
+        Name of the points.
     points
         Errors at points that took no part in the fit.
     max_error_px
         Largest root mean square error, in input pixels.
     misses_px
-        Root mean square inconsistency of the ways back, by name; NaN: not measured.
+        Root mean square inconsistency of the paths back, by name; NaN: not measured.
     log10_chance
-        log10 of the probability that random points would agree as well; NaN: they are none.
+        log10 of the probability that random points would agree as well; NaN for check points.
     """
 
     name: str
@@ -47,7 +46,7 @@ class AssessmentEvidence:
 
     @property
     def held_out(self) -> Agreement:
-        """How the points agree; nothing is known of the model's spread."""
+        """The agreement of the points; the model's spread is unknown."""
         used, count = int(self.points.used.sum()), len(self.points)
         rmse, limit = self.points.in_pixels.rmse, self.max_error_px
         return Agreement(self.name, used, count, self.log10_chance, rmse, limit, 0.0, "")
@@ -55,7 +54,7 @@ class AssessmentEvidence:
 
 @dataclass(frozen=True)
 class Assessment:
-    """All that was measured of a registration; no points where there was no evidence.
+    """All measurements of a registration; without evidence, a part has no points.
 
     Parameters
     ----------
@@ -66,8 +65,7 @@ class Assessment:
     check_points
         Independent points, which all count.
     two_way, three_way
-        How far a way back by other transforms misses the start, over the input (see
-        `consistency`).
+        Misclosure of a path back by other transforms, over the input (see `consistency`).
     """
 
     control_points: PointErrors = field(default_factory=PointErrors.none)
@@ -77,7 +75,7 @@ class Assessment:
     three_way: PointErrors = field(default_factory=PointErrors.none)
 
     def parts(self) -> dict[str, PointErrors]:
-        """Return everything by name."""
+        """Return the parts by name."""
         return {name: getattr(self, name) for name in Assessment.__dataclass_fields__}
 
     def summary(self) -> dict[str, Any]:
@@ -85,7 +83,7 @@ class Assessment:
         return {name: errors.summary() for name, errors in self.parts().items()}
 
     def judge(self, max_error_px: float) -> Verdict:
-        """Accept or refuse the registration by its check points, without such by test points.
+        """Accept or refuse the registration by its check points or, without any, its test points.
 
         Inconsistency can refuse a registration, but consistency alone cannot confirm it.
 

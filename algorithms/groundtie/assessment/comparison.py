@@ -1,4 +1,4 @@
-"""Reference and input, one over the other: what swipe and checkerboard of a report show."""
+"""Reference and input on one grid, for the swipe and checkerboard of a report."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Comparison:
     Parameters
     ----------
     reference, nominal, registered
-        The reference, the input where its georeferencing puts it, and the input where a transform
-        puts it (None: there is no transform).
+        The reference, the input placed by its georeferencing, and the input placed by a transform
+        (None: there is no transform).
     masks
-        By the names of these pictures, tints of what is masked, transparent elsewhere.
+        Tints of masked pixels, transparent elsewhere, by the names of these pictures.
     backdrop
         The reference, small and faint.
     reference_name, input_name
@@ -80,7 +80,7 @@ class Comparison:
 
 
 def without_masks(pair: ImagePair) -> ImagePair:
-    """Return a pair whose images are shown whole."""
+    """Return a pair without masks, so that its images are shown whole."""
     return replace(
         pair,
         reference=replace(pair.reference, mask=None),
@@ -100,7 +100,7 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
     GeoreferencingError
         Only one of the reference and the transform has a CRS.
     NoOverlapError
-        The registered input does not lie on the reference.
+        The registered input does not overlap the reference.
     """
     grid = reference.grid
     require_both_or_none(grid.crs, transform.crs, f"{reference.path} and the transform")
@@ -113,10 +113,10 @@ def compare(reference: RasterSource, input: RasterSource, transform: Transform) 
 
 
 def _overlap(grid: Grid, transform: Transform) -> FloatArray:
-    """Return positions on a grid's map, (n, 2), that what it shows of an input lies between.
+    """Return positions on a grid's map, (n, 2), that enclose the part of an input on the grid.
 
-    What of each outline the other shows: the input's own, of the whole Earth, folds where the grid
-    counts longitudes another way.
+    Both outlines are needed: that of an input of the whole Earth folds where the grid's longitudes
+    have another range.
     """
     footprint = transform.inverse(transform.input_grid.outline())
     own = grid.pixel_to_map(grid.outline())

@@ -1,4 +1,4 @@
-"""Registration consistency: how far several transforms that should cancel out do not.
+"""Registration consistency: the misclosure of transforms that should cancel out.
 
 Consistency needs no points, but is no measure of accuracy: transforms that are wrong in the same
 way are consistent. Source: [Suri2010] eq 2.4 (two-way, after [Holden2000]) and eq 5.2
@@ -19,18 +19,18 @@ from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, mesh, reproject
 from .point_errors import PointErrors
 
-# Places along the input's longer side at which consistency is measured.
+# Number of positions along the input's longer side at which consistency is measured.
 _PLACES = 33
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One transform on the way from the map of one image to that of another.
+    """One transform on the path from the map of one image to that of another.
 
     Parameters
     ----------
     name
-        What error messages call it.
+        Its name in error messages.
     transform
         From reference to input.
     reverse
@@ -57,9 +57,9 @@ class Leg:
         Returns
         -------
         xy
-            Where those that lie in the transform's input lie on the other image's map, (m, 2).
+            Positions on the other image's map, (m, 2), of those inside the transform's input.
         inside
-            Which these are, shape (n,).
+            Which positions are inside, shape (n,).
         """
         own = self.transform.input_grid
         px = own.map_to_pixel(own.to_own_map(xy, own.crs)) if self.reverse else self.transform(xy)
@@ -69,9 +69,9 @@ class Leg:
 
 
 def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
-    """Measure how far a transform misses the place that another way leads to.
+    """Measure the misclosure of a transform and another path between its images.
 
-    The way leads from the transform's input to its reference; the transform leads back. Two-way
+    The path leads from the transform's input to its reference; the transform leads back. Two-way
     consistency has one leg: the registration of the reference to the input. Three-way consistency
     leads through a third image. The errors' mean length is the registration consistency of
     [Suri2010] eq 2.4.
@@ -79,7 +79,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
     Parameters
     ----------
     transform
-        What is measured.
+        The measured transform.
     way
         The legs from its input to its reference.
 
@@ -93,7 +93,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
     GeoreferencingError
         Only one of two maps that should be the same has a CRS.
     NoOverlapError
-        There is no place that all transforms reach.
+        There is no position that all transforms reach.
     """
     own = transform.transform.input_grid
     start_px = spread_over(own)
@@ -110,7 +110,7 @@ def consistency(transform: Leg, way: Sequence[Leg]) -> PointErrors:
 
 
 def _entering(leg: Leg, xy: FloatArray, crs: CRS | None, name: str) -> FloatArray:
-    """Return positions that the transform `name` led to in the CRS that a leg starts from."""
+    """Return positions that the transform `name` led to, in the CRS that a leg starts from."""
     if (leg.start_crs is None) != (crs is None):
         raise GeoreferencingError(
             f"{leg.name} does not continue {name}: only one of the two maps has a CRS"
@@ -127,6 +127,6 @@ def spread_over(grid: Grid) -> FloatArray:
     axes = []
     for side in grid.size:
         count = max(round(side / step), 1)
-        # In the middles of equal parts, as pixels lie in a grid.
+        # At the centres of equal parts, as pixels of a grid.
         axes.append((np.arange(count) + 0.5) * side / count - 0.5)
     return mesh(*axes)

@@ -1,4 +1,4 @@
-"""The files that a registration is given and measured by, and errors at the points of a file."""
+"""The files that hold a registration and its evidence, and errors at the points of a file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .point_errors import WINDOW_PX, PointErrors
 
 @dataclass(frozen=True)
 class AssessmentFiles:
-    """The files that a registration is given and measured by; None: not given."""
+    """The files that hold a registration and its evidence; None: not given."""
 
     transform: Path | None
     tie_points: Path | None
@@ -40,13 +40,13 @@ class AssessmentFiles:
 
     @property
     def is_nominal(self) -> bool:
-        """Whether it is the input's own georeferencing that is measured."""
+        """Whether the input's own georeferencing is measured."""
         return self.transform is None and self.tie_points is None
 
     def check(
         self, images: Mapping[str, Path | None], max_error_px: float | None, has_report: bool
     ) -> None:
-        """Raise if the parameters do not go together; `images` are reference and input."""
+        """Raise an error if parameters contradict each other; `images` are reference and input."""
         closing = self.closing_transform, self.direct_transform
         if None not in closing or (closing == (None, None)) != (self.onward_transform is None):
             raise ParameterError(
@@ -70,7 +70,7 @@ class AssessmentFiles:
     def registration(
         self, model: str, reference: RasterSource | None, input: RasterSource | None
     ) -> Transform:
-        """Return the transform that is measured; `model` is fitted to tie points without one."""
+        """Return the measured transform: the given one, `model` of tie points, or the nominal."""
         if self.transform is not None:
             found = load_transform(self.transform)
             return found if input is None else transform_of(found, input, self.transform)
@@ -87,7 +87,7 @@ class AssessmentFiles:
     def measure(
         self, found: Transform, max_error_px: float | None, reference: RasterSource | None
     ) -> Assessment:
-        """Measure a transform by all evidence there is."""
+        """Measure a transform by all evidence."""
         parts: dict[str, PointErrors] = {}
         if self.tie_points is not None:
             window_px = WINDOW_PX * matching_px(found, reference)
@@ -110,9 +110,9 @@ def _leg(path: Path, reverse: bool = False) -> Leg:
 
 
 def matching_px(transform: Transform, reference: RasterSource | None) -> float:
-    """Return how many pixels of the input one is that both images are matched in.
+    """Return the size of a matching pixel in input pixels.
 
-    That of the coarser image; of the input where the reference is not known.
+    Matching pixels are those of the coarser image, or of the input without a reference.
     """
     if reference is None:
         return 1.0
@@ -121,7 +121,7 @@ def matching_px(transform: Transform, reference: RasterSource | None) -> float:
     to_input = transform.of_map(grid.crs)
     first, right, down = to_input(grid.pixel_to_map(middle + [[0, 0], [1, 0], [0, 1]]))
     sides = np.hypot(*np.subtract([right, down], first).T)
-    # Where the middle lies nowhere, nothing is known.
+    # If the reference's centre has no position in the input, the input's pixels are taken.
     return float(sides[np.isfinite(sides)].max(initial=1.0))
 
 
@@ -133,8 +133,8 @@ def measure_tie_points(
 ) -> tuple[PointErrors, PointErrors]:
     """Measure a transform at its control points and at its test points, in a file of tie points.
 
-    Control points have the role "fit", test points the role "check"; these were searched for in
-    windows of such a side, in input pixels. Raises as `read_points`.
+    Control points have the role "fit", test points the role "check". `window_px` is the side of the
+    windows in which test points were searched for, in input pixels. Raises as `read_points`.
     """
     points = read_points(path, transform)
     test = replace(_errors(transform, points, points.check), window_px=window_px)
@@ -147,8 +147,8 @@ def measure_check_points(
 ) -> PointErrors:
     """Measure a transform at independent points.
 
-    Where some points have a role, those without the role "check" do not take part; nor do they in
-    the file of the registration's `tie_points`.
+    If some points have a role, or the file is that of the registration's `tie_points`, only points
+    with the role "check" take part.
 
     Raises
     ------
@@ -173,17 +173,17 @@ def read_points(path: Path, transform: Transform) -> TiePoints:
     path
         The file: see `geometry.tie_point_files`.
     transform
-        Its map has a CSV table its reference positions on, if it names no CRS; its input grid
-        locates the points in the input.
+        Reference positions of a CSV table without a CRS are on its map. Its input grid locates the
+        points in the input.
 
     Raises
     ------
     TransformFileError
         The file cannot be read or understood.
     TooFewPointsError
-        It holds no points but rejected ones.
+        All points are rejected, or there are none.
     GeoreferencingError
-        Only one of the file and the transform has a CRS, or a position lies outside of it.
+        Only one of the file and the transform has a CRS, or a position lies outside of the map's.
     """
     points = read_tie_points(path, transform.input_grid, table_crs=transform.crs)
     if not points.used.any():

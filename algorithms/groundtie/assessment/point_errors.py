@@ -1,4 +1,4 @@
-"""By how much a transform misses points: those of its fit, and those held out of it."""
+"""Errors of a transform at points: those of its fit, and those held out of it."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ WINDOW_PX = 2.0 * CHECK_RADIUS_PX + 1
 
 @dataclass(frozen=True)
 class PointErrors(Rows):
-    """By how much a transform misses points, one row a point.
+    """Errors of a transform at points, one row a point.
 
     Parameters
     ----------
     position_px
         The points (col, row) in the image or grid whose pixels the errors are in, shape (n, 2).
     error_px
-        Where the input has the points minus where the transform puts them, shape (n, 2).
+        Measured minus transformed positions of the points, shape (n, 2).
     is_check
         Which points were held out of the fit, shape (n,).
     counted
         False for rejected points and outliers, which the statistics leave out, shape (n,).
     error_m
-        Where the registered input shows the points minus where they are, metres along the axes
-        of the reference map, shape (n, 2); None if there are no metres.
+        Registered minus reference positions of the points, metres along the axes of the reference
+        map, shape (n, 2); None without metres.
     window_px
         Side of the windows in which the points were searched for.
     """
@@ -94,7 +94,7 @@ class PointErrors(Rows):
 
     @property
     def used(self) -> Mask:
-        """Which points the statistics are of, shape (n,)."""
+        """Which points the statistics use, shape (n,)."""
         return self.counted & self.placed
 
     @property
@@ -129,9 +129,9 @@ class PointErrors(Rows):
 
     @property
     def log10_chance(self) -> float:
-        """log10 of the probability that random matches would agree as well; 0 of none.
+        """log10 of the probability that random matches would agree as well; 0 without points.
 
-        Within whatever radius is the least likely ([Moisan2004]).
+        It is that of the least likely radius ([Moisan2004]).
         """
         if not self.placed.any():
             return 0.0
@@ -139,15 +139,15 @@ class PointErrors(Rows):
 
     @property
     def _window_area_px2(self) -> float:
-        """Area in which outliers fall anywhere: that of the windows, or as errors show."""
+        """Area of uniform outliers: that of the windows, or of the errors' extent if larger."""
         return max(self.window_px**2, float(np.ptp(self.error_px[self.placed], axis=0).prod()))
 
     def of_inliers(self, max_error_px: float | None = None) -> PointErrors:
-        """Return the errors of which only those of inliers count.
+        """Return the errors with only inliers counted.
 
-        Inliers scatter around their place, outliers fall anywhere in their search window; the
-        verdict on a registration separates them in the same way. `max_error_px` is the root mean
-        square error that inliers may well have (None: as `coregister` has it).
+        Inliers scatter around zero; outliers are uniform over their search window. The verdict on a
+        registration separates them in the same way. `max_error_px` is the root mean square error
+        that inliers may have (None: the default of `coregister`).
         """
         which = self.placed
         errors = self.error_px[which]
@@ -170,7 +170,7 @@ class PointErrors(Rows):
 
 
 def _metres_per_unit(transform: Transform, xy: FloatArray) -> FloatArray:
-    """Return how long the reference map's units are at the middle of some positions, (2,)."""
+    """Return the metres per unit of the reference map at the centre of some positions, (2,)."""
     placed = finite(xy)
     centre = placed.mean(axis=0) if len(placed) else np.zeros(2)
     return np.array(metres_per_unit_at(centre, transform.crs))

@@ -19,15 +19,15 @@ from .statistics import Statistics
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """By how much RPCs miss points.
+    """Errors of RPCs at points.
 
     Parameters
     ----------
     error_px
-        Where the points are in the image minus where the RPCs see them (col, row), (n, 2).
+        Measured image positions of the points minus those by the RPCs (col, row), (n, 2).
     error_m
-        Where the RPCs put what the image shows, at the points' heights, minus where the points
-        are, metres along the axes of the map, (n, 2).
+        Map positions of the measured pixels by the RPCs, at the points' heights, minus those of
+        the points, metres along the axes of the map, (n, 2).
     """
 
     error_px: FloatArray
@@ -40,7 +40,7 @@ class SensorErrors:
         Raises
         ------
         GeoreferencingError
-            Points lie where the map has no ground, or have no ground or no image by the RPCs.
+            The map or the RPCs cannot place some points.
         """
         seen = rpc.localise(points.input_px, points.height_m)
         moved = reproject(seen, LON_LAT, points.crs) - points.reference_xy
@@ -52,7 +52,7 @@ class SensorErrors:
         return cls(error_px, moved * per_unit)
 
     def summary(self) -> dict[str, Any]:
-        """Return the statistics as values that JSON can carry."""
+        """Return the statistics as JSON values."""
         return {
             **Statistics.of(self.error_px).summary("px", ("col", "row")),
             **Statistics.of(self.error_m).summary("m", ("x", "y")),
@@ -97,7 +97,7 @@ def write_table(path: Path, points: ControlPoints, errors: dict[str, SensorError
 def draw_vectors(
     path: Path, points: ControlPoints, errors: dict[str, SensorErrors], size: tuple[int, int]
 ) -> None:
-    """Draw the errors as arrows in the image, before and after side by side, each to its scale."""
+    """Draw the errors as arrows in the image, before and after, each at its own scale."""
     from matplotlib.figure import Figure  # heavy
 
     figure = Figure(figsize=(5.0 * len(errors), 5.0 * size[1] / size[0] + 0.8), layout="tight")

@@ -1,4 +1,4 @@
-"""What a batch keeps apart: its rows run in any order, so none reads or writes another's files."""
+"""Keeping the rows of a batch apart: they run in any order, so none may use another's files."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ _BATCH = 0
 
 
 def check_apart(tool: Tool, calls: Sequence[Call], table: Path, results: Sequence[Path]) -> None:
-    """Raise if what a row or the batch writes is read or written by another.
+    """Raise an error if a file that a row or the batch writes is used by another row or the batch.
 
     Parameters
     ----------
     tool, calls
         The rows.
     table, results
-        What the batch itself reads and writes.
+        The files that the batch itself reads and writes.
 
     Raises
     ------
     SameFileError
-        Two write one file.
+        Two of them write the same file.
     OutputError
-        A file is read that another one writes, or that lies in another row's output folder.
+        One reads a file that another one writes, or that lies in another row's output folder.
     """
     writers = dict.fromkeys((path.resolve() for path in results), _BATCH)
     for call in calls:
@@ -60,7 +60,7 @@ def check_apart(tool: Tool, calls: Sequence[Call], table: Path, results: Sequenc
 
 
 def _check_named(tool: Tool, calls: Sequence[Call], writers: dict[Path, int]) -> None:
-    """Raise if a folder or a pattern stands for what another row will write."""
+    """Raise an error if a folder or a pattern stands for a file that another row will write."""
     written: dict[Path, list[Path]] = {}
     for path in writers:
         written.setdefault(path.parent, []).append(path)
@@ -82,7 +82,7 @@ def _name(row: int) -> str:
 
 
 def _read(tool: Tool, call: Call) -> Iterator[Path]:
-    """Yield what a call reads: what its inputs name, what that stands for, and is made of."""
+    """Yield the paths that a call reads: its inputs, the files behind them, and their sources."""
     for parameter in tool.parameters:
         value = call.values.get(parameter.name)
         named = (path for path in inputs_of(parameter.kind, value) if isinstance(path, Path))

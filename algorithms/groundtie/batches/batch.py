@@ -1,4 +1,4 @@
-"""A batch: the rows of a table, run, resumed, logged and summed up."""
+"""A batch: the rows of a table, run, resumed, logged and summarised."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class Batch:
     table
         Path of the table. Its inputs' relative paths begin at its folder.
     folder
-        Where outputs with relative paths go, and the summary.
+        Folder of the summary and of outputs with relative paths.
     log
         Path of the log.
     workers
-        Rows at the same time on this machine; by default one per processor.
+        Number of rows run in parallel on this machine; by default one per processor.
     scheduler
         Address of a Dask scheduler whose workers run the rows instead.
     """
@@ -65,19 +65,19 @@ class Batch:
         Parameters
         ----------
         resume
-            Take over what the log has of rows that ran already, if their files are unchanged.
+            Whether to take over the log's results of earlier runs, if their files are unchanged.
         progress
-            Of the whole batch.
+            Progress of the whole batch.
         executor
-            Runs the rows in the place of `workers` and `scheduler`; it stays open.
+            Runs the rows instead of `workers` and `scheduler`; it stays open.
 
         Raises
         ------
         ParameterError
             The table cannot be read or understood.
         SameFileError, OutputError
-            A row writes what another one, or the batch itself, reads or writes; a file cannot be
-            written.
+            A row writes a file that another one, or the batch itself, reads or writes; a file
+            cannot be written.
         SchedulerError
             The scheduler does not answer.
         """
@@ -98,7 +98,7 @@ class Batch:
         check_apart(tool, calls, self.table, [log_path, summary, details])
         ended = self._known(calls, resume)
         resumed = {number for number, outcome in ended.items() if outcome.status != FAILED}
-        # Connected to before the log begins: a scheduler that is not there costs no old log.
+        # Connect before the log is opened: a missing scheduler must not cost an older log.
         opened = (
             open_executor(workers, self.scheduler) if executor is None else nullcontext(executor)
         )
@@ -118,7 +118,7 @@ class Batch:
         return result
 
     def _known(self, calls: list[Call], resume: bool) -> dict[int, Outcome]:
-        """Return what is known without running anything, by the rows' numbers."""
+        """Return the outcomes that are known without running a call, by the rows' numbers."""
         finished = read_finished(self.log) if resume else {}
         known = {}
         for call in calls:
@@ -137,7 +137,7 @@ class Batch:
         log: EventLog,
         progress: Progress,
     ) -> None:
-        """Run the calls whose end is not known, and add it."""
+        """Run the calls without a known outcome, and add their outcomes."""
         for call in calls:
             if call.problem:
                 log.row(call, ended[call.row])

@@ -1,4 +1,4 @@
-"""The calls that a table asks for: values checked as for a single call."""
+"""The calls of a table's rows, with values checked as for a single call."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .input_files import Listed, facts_read, names_in
 # The column that is no parameter.
 NAME = "name"
 
-# Outputs that are what a tool is run for: named as their row alone.
+# Main outputs of tools, which are named by their row alone.
 _MAIN = ("output", "folder", "output_folder")
 
 _YES, _NO = ("true", "yes", "1"), ("false", "no", "0")
@@ -34,13 +34,13 @@ class Call:
     row
         Its number, from 1.
     name
-        What it is called: in results, and in the names of outputs that the row does not name.
+        Its name in results, and in the names of outputs that the row does not name.
     values
-        Checked values of all parameters; empty where there is a problem.
+        Checked values of all parameters; empty if there is a problem.
     outputs
-        Paths of the outputs that are asked for, by the parameters' names.
+        Paths of the requested outputs, by the parameters' names.
     key
-        Stands for tool, version, parameters, outputs, and the files that are read with their
+        Digest of tool, version, parameters, outputs, and the files that are read with their
         places, sizes and times: calls with the same key have the same results.
     problem
         Why the row cannot be run at all; empty if it can.
@@ -66,9 +66,9 @@ def make_calls(
     rows
         Values by parameters' names (see `read_rows`), and perhaps a `name`.
     inputs, outputs
-        Folders in which relative paths of inputs and of outputs lie.
+        Folders at which relative paths of inputs and of outputs begin.
     threads
-        How many a call uses, where the row does not say and the tool asks.
+        Workers of a call, if the tool has that parameter and the row does not state it.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def _call(
     }
     asked = [p.name for p in tool.parameters if _is_output(p) and values[p.name] is not None]
     for key in asked:
-        # Not by the rows: one that fails must not remove what another one is about to use.
+        # Not by the rows: one that fails must not remove a folder that another is about to use.
         make_folder(values[key].parent)
     checked = tool.check(values)
     written = {key: checked[key] for key in asked}
@@ -121,7 +121,7 @@ def _call(
 
 def _require_inside(name: str) -> None:
     """Raise an error for a row's name by which its outputs would leave the output folder."""
-    # By the signs of both systems: a table may be run on another one than before.
+    # By the separators of both systems: a table may be run on another system than before.
     parts = name.replace("\\", "/").split("/")
     anchor = PurePosixPath(name).anchor or PureWindowsPath(name).anchor
     if ".." in parts or anchor or "\0" in name:
@@ -147,7 +147,7 @@ def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: P
 
 
 def _located(value: Any, inputs: Path) -> Any:
-    """Return an input's place; what is no name is left to the parameter's check."""
+    """Return an input's place; values that are no names are left to the parameter's check."""
     if not isinstance(value, str) or not value or "\0" in value:
         return value
     found = raster_name(value, inputs)
@@ -159,7 +159,7 @@ def _is_output(parameter: Parameter) -> bool:
 
 
 def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path | None:
-    """Return where an output goes; one that is required has a name by default."""
+    """Return the path of an output; required outputs have a default name."""
     kind = parameter.kind
     if value is None:
         if not parameter.required:
@@ -175,7 +175,7 @@ def _output(parameter: Parameter, value: Any, name: str, folder: Path) -> Path |
 
 
 def files_written(tool: Tool, call: Call) -> Iterator[Path]:
-    """Yield all that a call writes, also what lies beside its outputs."""
+    """Yield all files that a call writes, also those beside its outputs."""
     for name, path in call.outputs.items():
         kind = tool.parameter(name).kind
         assert isinstance(kind, WrittenKind)

@@ -1,4 +1,4 @@
-"""The files that a call reads: what its inputs name or stand for, and what lies beside them."""
+"""The files that a call reads: those that its inputs stand for, and those beside them."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from ..runs import file_facts
 from ..series.inputs import rasters_behind
 from ..vrt_sources import sources_of
 
-# What GDAL reads beside a file is called as that: behind its name, or in the place of its ending.
-# GDAL itself is not asked: it would open each file here, where one that kills it ends more than its
-# row. Which endings there are differs with the driver and the mission, so that all count but these:
-# what tools write, and no driver takes for a part of an image.
+# Files that GDAL reads beside another have its name, with an ending added or replaced. GDAL itself
+# is not asked: it would open each file in this process, which a file that crashes it would end. The
+# endings differ between drivers and missions, so that all count except these: tools write them, and
+# no driver takes them for a part of an image.
 _OF_NO_RASTER = (".csv", ".json", ".geojson", ".gpkg", ".html")
 
-# What follows the name without its ending, of RPCs and metadata of several missions.
+# Suffixes of the stem, for RPCs and metadata of several missions.
 _MORE = ("", "_rpc", "_metadata")
 
-# What stands in the place of IMG in the names of Airbus and ALOS, whose tiles share these files.
+# Replacements of IMG in the names of Airbus and ALOS, for files that all tiles share.
 _OF_PRODUCT = ("dim", "rpc", "hdr")
 _TILE = re.compile(r"_r\d+c\d+$")
 
-# Returns the names of what lies in a folder, by these names without their endings in lower case.
+# Returns the names in a folder, by their stems in lower case.
 Listed = Callable[[Path], Mapping[str, Collection[str]]]
 
 
 def names_in(folder: Path) -> dict[str, list[str]]:
-    """Return the names of what lies in a folder, by their stems; none if it cannot be listed."""
+    """Return the names in a folder, by their stems in lower case; none if it cannot be listed."""
     found: dict[str, list[str]] = {}
     with suppress(OSError):
         for name in sorted(os.listdir(folder)):
@@ -64,23 +64,23 @@ def _names_read(kind: Kind, value: Any) -> Iterator[Path | str]:
 def facts_read(
     tool: Tool, values: Mapping[str, Any], written: Collection[Path], listed: Listed
 ) -> list[tuple[Any, ...]]:
-    """Return place, size and time of all files that a call reads, as a key can hold them.
+    """Return place, size and time of all files that a call reads, as facts for its key.
 
-    What lies on a server counts by its name; what lies where no file is found is never the same.
+    A file on a server counts by its name. A file that is not found never counts as unchanged.
 
     Parameters
     ----------
     tool, values
         The call.
     written
-        What it writes: this may lie beside what it reads, and is none of it.
+        Files that the call writes: they may lie beside its inputs, but are not read.
     listed
-        As `names_in`, which may keep what it has listed: calls read many files of few folders.
+        `names_in`, perhaps with a cache: calls read many files of few folders.
     """
     own = {os.path.abspath(path) for path in written}
     facts: list[tuple[Any, ...]] = []
     for parameter in tool.parameters:
-        # Once: tables and STAC items are read for them.
+        # Listed once, because tables and STAC items are read for it.
         names = list(_names_read(parameter.kind, values[parameter.name]))
         of_gdal = (name for name in names if isinstance(name, str))
         found = list(chain.from_iterable(map(facts_behind, of_gdal)))
@@ -95,12 +95,12 @@ def facts_read(
 def _facts(path: Path) -> tuple[Any, ...]:
     """Return the absolute path, and size in bytes and time in nanoseconds of a file."""
     place = os.path.abspath(path)
-    # A folder's own are no facts of the files in it.
+    # A folder's own size and time do not describe the files in it.
     return (place,) if path.is_dir() else file_facts(place)
 
 
 def _beside(path: Path, listed: Listed) -> Iterator[Path]:
-    """Yield what there is beside a file that belongs to it by its name."""
+    """Yield the existing files beside a file that belong to it by their names."""
     there = listed(path.parent)
     names = chain.from_iterable(there.get(stem, ()) for stem in _stems_beside(path))
     for name in names:
@@ -111,7 +111,7 @@ def _beside(path: Path, listed: Listed) -> Iterator[Path]:
 
 
 def _stems_beside(path: Path) -> list[str]:
-    """Return how names begin, in lower case and up to their endings, of what belongs to a file."""
+    """Return the stems, in lower case, of files that belong to a file."""
     name, stem = path.name.lower(), path.stem.lower()
     stems = [name, f"{name}.aux", *(stem + more for more in _MORE)]
     if stem.startswith(("img_", "img-")):

@@ -19,14 +19,14 @@ ROW = "row"
 
 
 class EventLog:
-    """Writes events to a file, each at once: a batch that is killed has told all until then."""
+    """Writes events to a file, each at once, so that a killed batch has logged all until then."""
 
     def __init__(self, path: Path, file: IO[str]) -> None:
         self._path = path
         self._file = file
 
     def write(self, event: str, **facts: Any) -> None:
-        """Write an event, with the time of now (RFC 3339, UTC).
+        """Write an event with the current time (RFC 3339, UTC).
 
         Raises
         ------
@@ -61,14 +61,14 @@ def open_log(path: Path, append: bool) -> Iterator[EventLog]:
             file.write("\n")
         yield EventLog(path, file)
     finally:
-        with writing(path):  # what could not be written is tried once more
+        with writing(path):  # closing retries unwritten text
             file.close()
 
 
 def read_finished(path: Path) -> dict[str, Outcome]:
     """Return the outcomes of rows that need not run again, by their calls' keys.
 
-    Of lines that are no event nothing is taken.
+    Lines that are no event are skipped.
     """
     finished = {}
     for event in read_json_lines(path, keeps_digits=True):
@@ -89,7 +89,7 @@ def _outcome(event: dict[str, Any]) -> Outcome:
 
 
 def still_there(outcome: Outcome) -> bool:
-    """Whether the files of an earlier run are as it left them."""
+    """Return whether the files of an earlier run are as it left them."""
     return files_of(tuple(map(Path, outcome.files))) == dict(outcome.files)
 
 

@@ -1,4 +1,4 @@
-"""What came of a batch: a table for people and spreadsheets, JSON for programs."""
+"""The results of a batch: a table for people and spreadsheets, JSON for programs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .work import DONE, EXIT_CODES, Outcome
 
 _FORMAT = "groundtie-batch/1"
 
-# So many rows that did not end well are lines of text; all of them are in the files.
+# Most refused or failed rows that are printed; the files hold all of them.
 _LINES = 20
 
 
@@ -29,7 +29,7 @@ class BatchRow:
     resumed: bool
 
     def summary(self) -> dict[str, Any]:
-        """Return the row as values that JSON can carry."""
+        """Return the row as JSON values."""
         return {
             "row": self.call.row,
             "name": self.call.name,
@@ -50,7 +50,7 @@ class BatchRow:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What came of all rows, in the table's order, and the files that hold it.
+    """The results of all rows, in the table's order, and the files that hold them.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class BatchResult:
     rows
         The rows.
     seconds
-        How long the batch took.
+        Duration of the batch.
     table, details, log
         The summary as CSV and as JSON, and the log.
     """
@@ -84,12 +84,12 @@ class BatchResult:
 
     @property
     def exit_code(self) -> int:
-        """Of the worst row: 2 if any failed, else 3 if any was refused, else 0."""
+        """Exit code of the worst row: 2 if any failed, else 3 if any was refused, else 0."""
         # `EXIT_CODES` has the worst status last.
         return [EXIT_CODES[status] for status, count in self.counts.items() if count][-1]
 
     def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
+        """Return the result as JSON values."""
         return {
             "format": _FORMAT,
             "tool": self.tool.name,

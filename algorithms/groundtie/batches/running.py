@@ -1,4 +1,4 @@
-"""Runs calls on an executor, and hands over each outcome as soon as it is there."""
+"""Running calls on an executor, with each outcome as soon as it is known."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def run_calls(
     Parameters
     ----------
     calls
-        What to run.
+        The calls to run.
     load, tool
         See `Task`.
     executor
-        Where: any executor whose workers can import `load`.
+        Any executor whose workers can import `load`.
     check
-        Called again and again; what it raises ends the work.
+        Called repeatedly; an error that it raises ends the work.
     """
     ended: SimpleQueue[Future[Outcome]] = SimpleQueue()
     waiting: dict[Future[Outcome], Call] = {}
@@ -66,16 +66,16 @@ def _outcome(future: Future[Outcome]) -> Outcome:
 
 
 def progress_line(ran: Counter[str], ended: int, rows: int, seconds: float) -> str:
-    """Return how far a batch is, for people; the rest is taken to last as what ran until now.
+    """Return the progress of a batch in words; the time left is extrapolated from rows that ran.
 
     Parameters
     ----------
     ran
-        How many rows ran, by how they ended.
+        Numbers of rows that ran, by status.
     ended, rows
-        How many rows have ended, with those that an earlier run knew, and how many there are.
+        Number of rows that have ended, including those known from an earlier run, and of all rows.
     seconds
-        For how long rows run.
+        Time since rows began to run.
     """
     troubles = [f"{count} {status}" for status, count in ran.items() if status != DONE]
     left_s = seconds * (rows - ended) / ran.total()
@@ -83,7 +83,7 @@ def progress_line(ran: Counter[str], ended: int, rows: int, seconds: float) -> s
 
 
 def duration(seconds: float) -> str:
-    """Return a duration in words, to two digits or so: 45 s, 12 min, 3.2 h."""
+    """Return a duration in words, to about two digits: 45 s, 12 min, 3.2 h."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

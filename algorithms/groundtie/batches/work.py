@@ -1,4 +1,4 @@
-"""What a worker does: one call, whose end, whatever it is, becomes numbers and words."""
+"""The work of a worker: one call, whose outcome, also a failure, becomes numbers and words."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..version import __version__
 
 DONE, REFUSED, FAILED = "done", "refused", "failed"
 
-# What the command line of a single call ends with, the worst last.
+# Exit codes of the command line of a single call, the worst last.
 EXIT_CODES = {DONE: 0, REFUSED: NotRegisteredError.exit_code, FAILED: GroundTieError.exit_code}
 
 
@@ -34,16 +34,16 @@ class Outcome:
     status
         `done`, `refused` or `failed`.
     message
-        Why it was refused or failed, in one line.
+        Reason of a refusal or failure, in one line.
     seconds
-        How long it took.
+        Duration.
     result
-        The tool's summary; of a refused registration its verdict. Of numbers all are finite.
+        The tool's summary; for a refused registration, its verdict. All numbers are finite.
     files
-        Size in bytes and time in nanoseconds of what the call wrote, by the paths; none of what
-        an earlier run left under these names.
+        Size in bytes and time in nanoseconds of the files that the call wrote, by their paths;
+        files that an earlier run left under these names are not among them.
     traceback
-        Of a failure that is a bug.
+        Traceback of a failure that is a bug.
     """
 
     status: str
@@ -55,11 +55,11 @@ class Outcome:
 
     @property
     def exit_code(self) -> int:
-        """What the command line of this one call would have ended with."""
+        """Exit code that the command line of this call would have had."""
         return EXIT_CODES[self.status]
 
     def summary(self) -> dict[str, Any]:
-        """Return it as values that JSON can carry."""
+        """Return the outcome as JSON values."""
         return asdict(self)
 
 
@@ -76,7 +76,7 @@ class Task:
     outputs
         Paths that it writes.
     version
-        Of the package here: a worker's must be the same.
+        Version of the package here; a worker's must be the same.
     """
 
     load: Callable[[str], Tool]
@@ -86,7 +86,7 @@ class Task:
     version: str = __version__
 
     def run(self) -> Outcome:
-        """Run the call; whatever is wrong with it is an outcome, too."""
+        """Run the call; any error becomes an outcome, too."""
         enter_worker()
         started = time.perf_counter()
         result: Mapping[str, Any] = {}
@@ -109,11 +109,11 @@ class Task:
             trace = traceback.format_exc()
         seconds = time.perf_counter() - started
         files = files_of((*_among(self.outputs, written), *written))
-        # A number that is not finite is one row's, and must not cost the table of all rows.
+        # Numbers of one row that are not finite must not cost the table of all rows.
         return Outcome(status, message, seconds, plain(dict(result)), files, trace)
 
     def _call(self, written: list[Path]) -> dict[str, Any]:
-        """Run the tool, return its summary, and add what it writes to a list."""
+        """Run the tool, return its summary, and add the files that it writes to a list."""
         tool = self.load(self.tool)
 
         def run() -> dict[str, Any]:
@@ -129,18 +129,18 @@ class Task:
 
 
 def _among(outputs: Iterable[Path], written: Iterable[Path]) -> list[Path]:
-    """Return the outputs that were written: files, and folders that something came into."""
+    """Return the outputs that were written: files, and folders in which files were written."""
     places = {place for path in written for place in (path, *path.parents)}
     return [path for path in outputs if Path(os.path.abspath(path)) in places]
 
 
 def bug(error: Exception) -> str:
-    """Return the line on an exception that nobody expects."""
+    """Return the message for an unexpected exception."""
     return " ".join(f"this is a bug in GroundTie: {type(error).__name__}: {error}".split())
 
 
 def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:
-    """Return size in bytes and time in nanoseconds of what there is of these files.
+    """Return size in bytes and time in nanoseconds of the existing ones among these files.
 
     Folders, whose times change with any file in them, have zeros.
     """

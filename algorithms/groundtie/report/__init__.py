@@ -1,1 +1,1 @@
-"""Pages and pictures that show a result."""
+"""Pages and pictures of results."""

@@ -1,4 +1,4 @@
-"""The report on a registration that was made before."""
+"""The report on an existing registration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..registration.verdict import Verdict
 from . import figures
 from .page import Page
 
-# What an assessment's parts are called.
+# Names of an assessment's parts.
 PART_LABELS = {
     "control_points": "control points",
     "test_points": "test points",
@@ -27,16 +27,16 @@ PART_LABELS = {
 
 @dataclass(frozen=True)
 class AssessmentReport(Page):
-    """What is shown of how good a registration is that was made before.
+    """The report on the accuracy of an existing registration.
 
     Parameters
     ----------
     assessment
-        All that was measured.
+        All measurements.
     verdict
         Whether the registration can be trusted; None if no largest error was asked for.
     transform
-        What was measured.
+        The measured transform.
     comparison
         The images; None if they were not given.
     """
@@ -48,13 +48,13 @@ class AssessmentReport(Page):
     template: ClassVar[str] = "assessment.html.j2"
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was measured, by name."""
+        """Return the measured values by name."""
         verdict = None if self.verdict is None else self.verdict.summary()
         parts = self.assessment.summary()
         return {"verdict": verdict, **parts, "transform": self.transform.to_json()}
 
     def values(self) -> dict[str, Any]:
-        """Return what the template shows."""
+        """Return the values that the template shows."""
         parts = {name: errors for name, errors in self.assessment.parts().items() if len(errors)}
         return {
             "verdict": self.verdict,
@@ -67,7 +67,7 @@ class AssessmentReport(Page):
         }
 
     def _residuals(self) -> dict[str, Any] | None:
-        """Return what is shown of the errors at all points, over the input; None: nothing."""
+        """Return the template's values for the errors at all points, over the input; None: none."""
         measured = self.assessment
         fit = measured.control_points
         parts = (
@@ -75,7 +75,7 @@ class AssessmentReport(Page):
             measured.test_points,
             measured.check_points,
         )
-        # An outlier is shown: as a check point that disagrees.
+        # Outliers are shown, too, as check points that disagree.
         shown = [replace(part, counted=part.placed, error_m=None) for part in parts]
         errors = PointErrors.concatenate(shown)
         if not errors.used.any():

@@ -1,4 +1,4 @@
-"""How far, and in which direction, a transform moves the input, and how it turns and scales it."""
+"""The correction by a transform: shift, direction, rotation and scale of the input."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..rasters.grid import Grid
 
 @dataclass(frozen=True)
 class Correction:
-    """How far a transform moves the input from its nominal place, in matching pixels.
+    """The correction of the input's nominal position by a transform, in matching pixels.
 
     Parameters
     ----------
@@ -23,9 +23,9 @@ class Correction:
     direction
         The move at the centre along the axes of the map, in words.
     rotation_deg
-        By how much the input is rotated, anticlockwise as it is seen.
+        Rotation of the input, anticlockwise as displayed.
     scale
-        By which factor it is enlarged.
+        Enlargement of the input.
     centre_m
         Length at the centre on the ground; None without georeferencing.
     """
@@ -57,13 +57,13 @@ class Correction:
         )
 
     def text(self) -> str:
-        """Return the size of the correction in words, in the order of what is looked for first."""
+        """Return the correction in words, the values that readers look for first in front."""
         size, in_metres = f"{self.centre_px:.1f} px", ""
         if self.centre_m is not None:
             in_metres = f" ({self.centre_m:.1f} m)"
         direction = f": {self.direction}" if self.direction else ""
         rotated = "not rotated"
-        # what two decimals show
+        # visible in two decimals
         if abs(self.rotation_deg) >= 0.005:
             sense = "anticlockwise" if self.rotation_deg > 0 else "clockwise"
             rotated = f"rotated by {abs(self.rotation_deg):.2f}° {sense}"
@@ -75,13 +75,13 @@ class Correction:
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return the correction as values that JSON can carry."""
+        """Return the correction as JSON values."""
         return {name: value for name, value in vars(self).items() if name != "centre_m"}
 
 
 def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> tuple[float, float]:
     """Return rotation (degrees) and scale of the affine map that fits a move best."""
-    # Metres, with y upwards as it is seen.
+    # Metres, with y upwards as displayed.
     seen = np.array(grid.metres_per_unit) * ([1, 1] if grid.is_georeferenced else [1, -1])
     before, after = ((places - places.mean(axis=0)) * seen for places in (nominal, xy))
     (a, b), (c, d) = np.linalg.lstsq(before, after, rcond=None)[0].T
@@ -91,9 +91,9 @@ def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> 
 def move_in_words(move: NDArray[np.float64], grid: Grid) -> str:
     """Return a move in map units along both axes, as "3.0 m east, 1.5 m north".
 
-    Without georeferencing in matching pixels, as lengths are.
+    Without georeferencing it is in matching pixels, as lengths are.
     """
-    # A map without georeferencing is the pixels, y downwards.
+    # Without georeferencing, map positions are pixels, y downwards.
     on_map = grid.is_georeferenced
     ways = (("west", "east"), ("south", "north")) if on_map else (("left", "right"), ("up", "down"))
     unit_m = np.array(grid.metres_per_unit)

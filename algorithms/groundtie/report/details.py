@@ -1,4 +1,4 @@
-"""Chips of both images at full resolution, before and after, where they tell most."""
+"""Chips of both images at full resolution, before and after, at the most informative places."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..rasters.grid import FloatArray, Grid, mesh
 from ..rasters.pair import ImagePair
 from . import pictures
 
-# Side of a chip, in matching pixels: some twenty of them stay well below a megabyte.
+# Side of a chip, in matching pixels: about twenty chips stay well below a megabyte.
 SIDE_PX = 128
 
-# So many of the best and of the worst check points.
+# Number of best and of worst check points.
 _EXTREMES = 2
 
 _CORNERS = ("upper left", "upper right", "lower left", "lower right")
 
 
 def extremes(error_px: FloatArray, most: int) -> list[tuple[str, int]]:
-    """Return labels and indices of the best and worst of check points, `most` of each."""
+    """Return labels and indices of the best and the worst check points, at most `most` of each."""
     order = error_px.argsort()
     best, worst = order[:most], order[most:][-most:]
     labels = ["best check point"] * len(best) + ["worst check point"] * len(worst)
@@ -42,7 +42,7 @@ def places(errors: PointErrors, grid: Grid) -> list[tuple[str, FloatArray]]:
 
 
 def shown(pair: ImagePair, transform: Transform, errors: PointErrors) -> list[dict[str, Any]]:
-    """Return what a page shows at these places of a pair, which has no masks."""
+    """Return the template's values for chips at these places of a pair without masks."""
     grid = pair.grid
     side = min(SIDE_PX, *grid.size)
     made = []

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# People with any colour vision see them as different [Okabe2008].
+# Distinguishable with any colour vision [Okabe2008].
 FIT_COLOUR = "#0072b2"
 CHECK_COLOUR = "#d55e00"
 REJECTED_COLOUR = "#7a7a7a"
@@ -38,11 +38,11 @@ class Arrows:
     Parameters
     ----------
     vector_px
-        What the arrows span in the matching grid, shape (n, 2).
+        Vectors of the arrows in the matching grid, shape (n, 2).
     exaggeration
-        How many times longer than the residuals they are.
+        Ratio of the arrows' length to the residuals'.
     scale_px
-        Residual that the scale's arrow stands for.
+        Residual that the scale's arrow represents.
     """
 
     vector_px: FloatArray
@@ -52,10 +52,10 @@ class Arrows:
 
 def residual_arrows(errors: PointErrors, grid: Grid) -> Arrows:
     """Exaggerate residuals so that the typical one is well visible."""
-    # A flexible model leaves next to nothing at the points of its own fit.
+    # A flexible model has next to no residuals at the points of its own fit.
     enough = errors.agreeing.sum() >= FEWEST_CHECK_POINTS
     which = errors.agreeing if enough else errors.used
-    # Where there is none, as if all were as long as the grid: nothing is exaggerated.
+    # Without points, as if residuals were as long as the grid: nothing is exaggerated.
     typical_px = float(np.median(errors.length_px[which])) if which.any() else max(grid.size)
     return scaled_arrows(errors.error_px, typical_px, 0.04, grid)
 
@@ -68,9 +68,9 @@ def scaled_arrows(by_px: FloatArray, length_px: float, share: float, grid: Grid)
 
 
 def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
-    """Return up to which error the figures of errors reach, in matching pixels.
+    """Return the largest error within the figures of errors, in matching pixels.
 
-    As far as needed to see the errors of inliers; without such, to the largest error.
+    It encloses the errors of inliers or, if these are unknown, the largest error.
     """
     radius = ce90_of_rmse(verdict.check_rmse_px)
     if math.isfinite(radius):
@@ -79,7 +79,7 @@ def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
 
 
 def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
-    """Return how many check points per bin the verdict's error explains, at errors, shape (n,).
+    """Return the check points per bin expected by the verdict's error, at errors, shape (n,).
 
     Lengths of circular normal errors have a Rayleigh distribution; it is scaled to the number of
     check points that agree.
@@ -98,7 +98,7 @@ def svg_uri(figure: Figure) -> str:
 
 
 def shown_residuals(errors: PointErrors, grid: Grid) -> dict[str, Any]:
-    """Return what a page shows of residuals: their map, and how exaggerated its arrows are."""
+    """Return the template's values for residuals: their map, and the arrows' exaggeration."""
     arrows = residual_arrows(errors, grid)
     return {
         "map": svg_uri(residual_map(errors, arrows, grid)),
@@ -109,7 +109,7 @@ def shown_residuals(errors: PointErrors, grid: Grid) -> dict[str, Any]:
 def shown_errors(
     errors: PointErrors, verdict: Verdict, metres_per_px: float | None
 ) -> dict[str, str]:
-    """Return what a page shows of the errors at check points; see `error_histogram`."""
+    """Return the template's values for errors at check points; see `error_histogram`."""
     return {
         "histogram": svg_uri(error_histogram(errors, verdict, metres_per_px)),
         "scatter": svg_uri(error_scatter(errors, verdict)),
@@ -135,7 +135,7 @@ def residual_map(errors: PointErrors, arrows: Arrows, grid: Grid) -> Figure:
 
 
 def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float | None) -> Figure:
-    """Draw how many check points have which error, and the curve that the verdict's error means.
+    """Draw a histogram of check points' errors, and the curve expected by the verdict's error.
 
     `metres_per_px` adds a scale in metres; None: there are no metres.
     """
@@ -231,7 +231,7 @@ def draw_arrows(
 
 
 def draw_scale(axes: Any, arrows: Arrows, grid: Grid, shown_px: FloatArray) -> None:
-    """Draw the arrow that a round residual has, in the corner with the fewest points, (n, 2)."""
+    """Draw the arrow of a round residual, in the corner with the fewest points, (n, 2)."""
     from matplotlib.patches import Rectangle
 
     unit = max(grid.size) / 100
@@ -244,7 +244,7 @@ def draw_scale(axes: Any, arrows: Arrows, grid: Grid, shown_px: FloatArray) -> N
             for x in (2 * unit, grid.width - 2 * unit - size[0])
         ]
     )
-    # A point is drawn as large as a unit or so.
+    # A point is drawn about as large as a unit.
     beside = np.abs(shown_px - (corners + size / 2)[:, None]) <= size / 2 + unit
     left, top = corners[beside.all(axis=2).sum(axis=1).argmin()]
     axes.add_patch(Rectangle((left, top), *size, fc="white", ec="#999999", lw=0.8, zorder=3))
@@ -255,7 +255,7 @@ def draw_scale(axes: Any, arrows: Arrows, grid: Grid, shown_px: FloatArray) -> N
 
 
 def without_frame(axes: Any) -> None:
-    """Leave the lines at the top and at the right of a plot away."""
+    """Omit the lines at the top and at the right of a plot."""
     axes.spines[["top", "right"]].set_visible(False)
 
 

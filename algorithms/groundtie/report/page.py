@@ -1,4 +1,4 @@
-"""What all reports share: one HTML page without network, and its numbers as JSON."""
+"""The base of all reports: one HTML page that needs no network, and its numbers as JSON."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Page:
     title
         Heading of the page.
     parameters
-        What the tool was called with; None: by default.
+        Parameters of the tool's call; None: the default.
     seconds
-        How long it took.
+        Duration.
     """
 
     template: ClassVar[str]
@@ -48,11 +48,11 @@ class Page:
     seconds: float
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was measured, by name."""
+        """Return the measured values by name."""
         raise NotImplementedError
 
     def values(self) -> dict[str, Any]:
-        """Return what the template shows besides what all pages show."""
+        """Return the template's values beyond those of all pages."""
         raise NotImplementedError
 
     def summary(self) -> dict[str, Any]:
@@ -65,9 +65,9 @@ class Page:
         path: Path,
         item: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
-        """Write the page, an HTML file, and before it its numbers, the JSON file beside it.
+        """Write the numbers, a JSON file, and then the page, an HTML file beside it.
 
-        With the members of a STAC `item` that file is one (see `stac`).
+        With the members of a STAC `item`, the JSON file is a STAC item (see `stac`).
 
         Raises
         ------
@@ -109,7 +109,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def _environment() -> Any:
-    """Return what renders pages; it keeps compiled templates for all pages of a process."""
+    """Return the renderer of pages; it keeps compiled templates for all pages of a process."""
     import jinja2  # heavy
 
     environment = jinja2.Environment(

@@ -1,4 +1,4 @@
-"""The parts of a scene that lie elsewhere than its transform has them, in words and as a map."""
+"""The parts of a scene that its transform misplaces, in words and as a map."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .correction import move_in_words
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Colours that people with any colour vision tell apart, but for those of points [Okabe2008].
+# Colours distinguishable with any colour vision, other than those of points [Okabe2008].
 COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
 def summary(survey: Survey) -> list[dict[str, Any]]:
-    """Return the parts that a survey shows as values that JSON can carry."""
+    """Return the parts that a survey found as JSON values."""
     return [
         {
             "where": part.where,
@@ -33,12 +33,12 @@ def summary(survey: Survey) -> list[dict[str, Any]]:
 
 
 def lines(survey: Survey) -> list[str]:
-    """Return each part in words: where it lies, and how far off."""
+    """Return each part in words: its place, and its offset."""
     return [_in_words(part, survey) for part in survey.parts]
 
 
 def shown(survey: Survey) -> dict[str, Any] | None:
-    """Return what a page shows of the parts; None: there are none."""
+    """Return the template's values for the parts; None: there are none."""
     parts = survey.parts
     if not parts:
         return None
@@ -52,7 +52,7 @@ def shown(survey: Survey) -> dict[str, Any] | None:
 
 
 def parts_map(survey: Survey) -> Figure:
-    """Draw where the chips match: each part in its colour, the figure's edges are the grid's."""
+    """Draw the matched chips, each part in its colour; the figure's edges are the grid's."""
     grid, parts = survey.grid, survey.parts
     axes = figures.map_axes(grid)
     confirming = survey.is_confirming_chip
@@ -73,7 +73,7 @@ def parts_map(survey: Survey) -> Figure:
 
 
 def confirming(survey: Survey, part: Part) -> int:
-    """Return how many chips of a part match where the transform has them."""
+    """Return the number of a part's chips that match where the transform places them."""
     return int(survey.is_confirming_chip[list(part.members)].sum())
 
 

@@ -23,28 +23,28 @@ LARGEST_JPEG_BYTES = 330_000
 
 _JPEG_QUALITIES = (85, 75, 60, 45, 30, 15)
 
-# Grey of pixels without data, and contrast of what is drawn on: both a matter of looks.
+# Grey of pixels without data, and contrast of a backdrop: both chosen by eye.
 _NO_DATA_GREY = 226
 _BACKDROP_STRENGTH = 0.4
 
-# What is masked: reddish purple [Okabe2008].
+# Tint of masked pixels: reddish purple [Okabe2008].
 _TINT_BGRA = (167, 121, 204, 77)
 
-# A side of the lattice on which an overview follows a transform.
+# Nodes a side of the lattice that replaces a transform in an overview.
 _NODES = 33
 
 
 def overview_grid(grid: Grid, longest_px: int = OVERVIEW_PX) -> Grid:
-    """Return a grid with larger pixels, if need be, so that no side is longer than this."""
+    """Return a grid with larger pixels, if needed, so that no side is longer than this."""
     factor = max(grid.size) / longest_px
     return grid.scaled(factor) if factor > 1 else grid
 
 
 def overview_positions(to_input_px: PointFunction, grid: Grid) -> PointFunction:
-    """Return a fast stand-in for a transform, good to a fraction of an overview's pixel.
+    """Return a fast approximation of a transform, good to a fraction of an overview's pixel.
 
     A spline with hundreds of knots would take longer than all the rest of the report. Where there
-    is none, as where an input of the whole Earth ends and begins anew, it is the transform itself.
+    is no approximation, as at the seam of an input of the whole Earth, it is the transform itself.
     """
     from scipy.interpolate import RectBivariateSpline
 
@@ -79,7 +79,7 @@ def grey_picture(patch: Patch) -> Picture:
 
 
 def tint_uri(masked: NDArray[np.bool_]) -> str:
-    """Return a tint of what is masked, elsewhere transparent, as the data URI of a PNG."""
+    """Return a tint of masked pixels, transparent elsewhere, as the data URI of a PNG."""
     picture = np.zeros((*masked.shape, 4), np.uint8)
     picture[masked] = _TINT_BGRA
     return png_uri(picture)
@@ -94,7 +94,7 @@ def backdrop(picture: Picture) -> Picture:
 
 
 def jpeg_uri(picture: Picture) -> str:
-    """Return a picture as a data URI, in the best quality that is not too large."""
+    """Return a picture as a data URI, in the best quality within `LARGEST_JPEG_BYTES`."""
     for quality in _JPEG_QUALITIES:
         data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
         if len(data) <= LARGEST_JPEG_BYTES:
@@ -116,5 +116,5 @@ def png_uri(picture: Picture) -> str:
 
 
 def data_uri(kind: str, data: bytes) -> str:
-    """Return data as a URI that holds all of it."""
+    """Return a URI that holds the data."""
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"

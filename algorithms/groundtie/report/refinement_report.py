@@ -13,7 +13,7 @@ from .page import Page
 
 @dataclass(frozen=True)
 class RefinementReport(Page):
-    """What is shown of refined RPCs, whatever the verdict.
+    """The report on refined RPCs, whatever the verdict.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class RefinementReport(Page):
     template: ClassVar[str] = "refinement.html.j2"
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was measured, by name."""
+        """Return the measured values by name."""
         found = self.refined
         return {
             "verdict": found.verdict.summary() | found.evidence.summary(),
@@ -39,7 +39,7 @@ class RefinementReport(Page):
         }
 
     def values(self) -> dict[str, Any]:
-        """Return what the template shows."""
+        """Return the values that the template shows."""
         found, verdict, evidence = self.refined, self.refined.verdict, self.refined.evidence
         residuals, grid, bias = found.residuals(), found.grid, found.adjustment.bias
         measured = {"before": evidence.before, "after": evidence.after}

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Report(Page):
-    """What is shown of a registration, whatever the verdict.
+    """The report on a registration, whatever the verdict.
 
     Parameters
     ----------
     registration
-        What is shown; its rasters are open.
+        The registration; its rasters are open.
     """
 
     registration: Registration
     template: ClassVar[str] = "report.html.j2"
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was measured, by name."""
+        """Return the measured values by name."""
         found, survey = self.registration, self._survey
         correction, transform, beyond = found.correction, found.transform, found.beyond
         return {
@@ -47,7 +47,7 @@ class Report(Page):
         }
 
     def values(self) -> dict[str, Any]:
-        """Return what the template shows."""
+        """Return the values that the template shows."""
         found, pair, survey = self.registration, self.registration.pair, self._survey
         beyond = () if found.beyond is None else (found.beyond.line(),)
         return {
@@ -67,7 +67,7 @@ class Report(Page):
 
     @property
     def _survey(self) -> Survey | None:
-        """What chips all over the overlap show; None: not looked at."""
+        """The survey by chips all over the overlap; None: there was none."""
         evidence = self.registration.evidence
         return None if evidence is None else evidence.surveys.whole
 
@@ -108,6 +108,6 @@ def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
         "uri": pictures.surface_uri(surface),
         "radius": radius,
         "peak": peak,
-        # Where the peak lies in a picture of (2 radius + 1)² unit squares.
+        # Position of the peak in a picture of (2 radius + 1)² unit squares.
         "at": [radius + 0.5 + shift for shift in peak.shift_px],
     }

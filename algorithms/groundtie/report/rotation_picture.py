@@ -1,4 +1,4 @@
-"""The picture of what `estimate_rotation` found."""
+"""The picture of the result of `estimate_rotation`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def draw_rotation(
     title: str,
     context: Context,
 ) -> None:
-    """Draw how well all rotations, scales and shifts match, and both images, as a PNG.
+    """Draw the similarity of all rotations, scales and shifts, and both images, as a PNG.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def draw_rotation(
 
 
 def checkerboard(reference: Patch, input: Patch, pose: Pose) -> NDArray[np.uint8]:
-    """Return squares of the reference and of the input as it lies on it, by turns."""
+    """Return alternate squares of the reference and of the input placed by a pose."""
     rows, cols = reference.values.shape
     to_input: Affine = pose.between((rows, cols), input.values.shape[:2])
     matrix = np.array([[to_input.a, to_input.b, to_input.c], [to_input.d, to_input.e, to_input.f]])

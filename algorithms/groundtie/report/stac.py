@@ -1,4 +1,4 @@
-"""A registered raster as a STAC item, whose fields stand beside the report's own in its JSON."""
+"""A registered raster as a STAC item, whose fields are added to those of the report's JSON."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ EXTENSIONS = (
 
 _TIFF = "image/tiff; application=geotiff"
 
-# A footprint with more degrees of longitude crosses the antimeridian, where it has two parts.
+# A footprint of more degrees of longitude crosses the antimeridian, which divides it in two.
 _MOST_DEGREES = 180
 
 
@@ -42,8 +42,8 @@ def stac_item(
 ) -> dict[str, Any]:
     """Return the members of a STAC item of a registered raster.
 
-    Empty where there can be none: without a CRS, where nothing states when the image was taken,
-    and across the antimeridian.
+    Empty if there can be none: without a CRS, without a time of acquisition, and across the
+    antimeridian.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ def stac_item(
     output, grid
         The registered raster.
     folder
-        Where the JSON lies.
+        Folder of the JSON.
     quality
-        Properties that state how good the registration is; see `quality_of`.
+        Properties on the registration's accuracy; see `quality_of`.
     time
-        When the image was taken; None: as `source` states it.
+        Time of acquisition; None: as `source` states it.
     """
     time = time or stated_time(source.tags.get("IMAGERY", {}).get("ACQUISITIONDATETIME", ""))
     time = time or time_of(file_name(source.path))
@@ -85,7 +85,7 @@ def stac_item(
 
 
 def quality_of(verdict: Verdict, transform: Transform) -> dict[str, Any]:
-    """Return the properties of the item of one registration that state how good it is."""
+    """Return the properties on the accuracy of one registration."""
     return {
         "accuracy:geometric_rmse": verdict.check_rmse_m,
         "groundtie:ce90_m": verdict.ce90_m,
@@ -122,6 +122,6 @@ def _asset(output: Path, folder: Path) -> dict[str, Any]:
     asset: dict[str, Any] = {"href": quote(os.fsencode(href), safe="/:"), "roles": ["data"]}
     if output.name.lower().endswith(COG_SUFFIXES):
         return asset | {"type": f"{_TIFF}; profile=cloud-optimized"}
-    # The media type of others is none that readers know.
+    # Readers know no media type of other formats.
     is_tiff = output.suffix.lower() in GEOTIFF
     return asset | {"type": _TIFF} if is_tiff else asset

@@ -1,4 +1,4 @@
-"""Estimating the bias of RPCs from ground control of which some may be blunders."""
+"""Estimating the bias of RPCs from ground control that may contain blunders."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from ..kinds import AUTO
 from ..rasters.grid import FloatArray
 from .bias import KINDS, SHIFT, TERMS, Bias, design
 
-# Standard deviation that inliers may have beyond their own, in pixels.
+# Range of the standard deviation of inlier residuals, an axis, in pixels.
 _SIGMA_RANGE_PX = (0.1, 2.5)
 
-# Fits and separations of blunders take turns until the same points are used, at most so often.
+# Most alternations of fitting and separating blunders; they end when the inliers stay the same.
 _STEPS = 30
 
-# No image is measured better than this.
+# Least standard deviation assumed of image measurements.
 SMALLEST_SIGMA_PX = 1e-3
 
-# Blunders lie anywhere within this distance at least, in pixels.
+# Least distance within which blunders are taken to be uniformly distributed, in pixels.
 LEAST_REACH_PX = 50
 
-# A model is carried by points that leave it uncertain by less, over the image, in pixels.
+# Points support a model whose standard deviation, an axis, is smaller all over the image, in px.
 _LARGEST_SIGMA_PX = 1.0
 
 
 @dataclass(frozen=True)
 class Control(Rows):
-    """Ground control as seen by RPCs, one row a point.
+    """Ground control with its image positions by RPCs, one row a point.
 
     Parameters
     ----------
     expected_px
-        Where the RPCs see the points, shape (n, 2).
+        Image positions of the points by the RPCs, shape (n, 2).
     found_px
-        Where they are in the image, shape (n, 2).
+        Measured image positions, shape (n, 2).
     covariance_px2
         Covariance of `found_px`, shape (n, 2, 2).
     size
@@ -58,7 +58,7 @@ class Control(Rows):
     size: tuple[int, int]
 
     def residuals_px(self, bias: Bias | None) -> FloatArray:
-        """Return found minus corrected positions, shape (n, 2); without a bias as delivered."""
+        """Return found minus corrected positions, shape (n, 2); None: of RPCs as delivered."""
         correction = 0.0 if bias is None else bias(self.expected_px)
         return np.asarray(self.found_px - self.expected_px - correction)
 
@@ -72,15 +72,15 @@ class Adjustment:
     bias
         The bias, with the covariance of its parameters.
     used
-        Which points are not taken for blunders, shape (n,).
+        Which points are inliers, shape (n,).
     sigma_px
         Standard deviation, an axis, of inliers beyond their covariances.
     fold_biases
-        The bias estimated again without one block of points after the other.
+        The biases estimated without one block of points each.
     left_out_px
-        Residuals of the points by an estimate that has not seen them, shape (n, 2).
+        Residuals of the points from an estimate without them, shape (n, 2).
     left_out_rmse_px
-        For each model that was considered, the root mean square of these, of inliers.
+        Root mean square of the inliers' left-out residuals, for each model that was considered.
     """
 
     bias: Bias
@@ -92,7 +92,7 @@ class Adjustment:
 
 
 def adjust(control: Control, kind: str = AUTO) -> Adjustment:
-    """Estimate the bias of RPCs by weighted least squares without the blunders.
+    """Estimate the bias of RPCs by weighted least squares, without blunders.
 
     Parameters
     ----------
@@ -100,12 +100,12 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
         The points.
     kind
         One of `bias.KINDS`, or "auto": the simplest model that left-out points justify and that
-        the points' number and spread carry.
+        the points' number and spread support.
 
     Raises
     ------
     TooFewPointsError
-        Fewer points, or fewer that agree, than the model needs.
+        Fewer points, or fewer consistent points, than the model needs.
     """
     if kind != AUTO:
         return _adjust(control, kind)
@@ -122,14 +122,14 @@ def adjust(control: Control, kind: str = AUTO) -> Adjustment:
 
 
 def _is_carried(tried: Adjustment, control: Control) -> bool:
-    """Return whether points hold a model all over the image."""
+    """Return whether the points determine a model well enough all over the image."""
     corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * control.size
     spread = np.median(jackknife_spread(tried.fold_biases, corners))
     return bool(max(tried.bias.sigma_px(corners).max(), spread) < _LARGEST_SIGMA_PX * np.sqrt(2))
 
 
 def _log_likelihoods(adjustment: Adjustment) -> FloatArray:
-    """Return the logarithm of the density of each point, inlier or blunder, shape (n,)."""
+    """Return the log density of each left-out residual, of inliers and blunders, shape (n,)."""
     squared = (adjustment.left_out_px**2).sum(axis=1)
     variance = max(float(squared[adjustment.used].mean()) / 2, _SIGMA_RANGE_PX[0] ** 2)
     share, area = float(adjustment.used.mean()), (2 * LEAST_REACH_PX) ** 2
@@ -167,7 +167,7 @@ def _adjust(control: Control, kind: str) -> Adjustment:
 
 
 def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_], float]:
-    """Return which points are more probably inliers than blunders, and the spread of these."""
+    """Return which points are more probably inliers than blunders, and the inliers' excess."""
     first = "translation" if kind == SHIFT else "affine"
     start = find_consensus(control.expected_px, control.found_px, CONSENSUS_PX, first)
     residuals = control.found_px - start(control.expected_px)
@@ -184,10 +184,10 @@ def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_],
 
 
 def reach_px(farthest_px: float, size: tuple[int, int]) -> float:
-    """Return how far off blunders are taken to fall, as likely anywhere.
+    """Return the distance within which blunders are taken to be uniformly distributed.
 
-    As far as the farthest, but no farther than the image is long: one point beyond, as of swapped
-    coordinates, would make others within seem to agree.
+    It is that of the farthest point, but at most the image's longer side: a single point beyond,
+    as of swapped coordinates, would make nearer blunders seem to agree.
     """
     return float(np.clip(farthest_px, LEAST_REACH_PX, max(LEAST_REACH_PX, *size)))
 

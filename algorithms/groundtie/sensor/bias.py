@@ -1,6 +1,6 @@
 """Corrections of RPCs in image space, and folding them into the coefficients.
 
-What is wrong with RPCs are attitude and position of the satellite; over a scene that moves image
+RPCs are in error because the satellite's attitude and position are. Over a scene, this moves image
 positions by a shift, drifts along the lines, or an affine change [Fraser2003].
 """
 
@@ -17,7 +17,7 @@ from ..rasters.grid import FloatArray
 from .rpc import RPC, image_places
 from .rpc_fit import HEIGHTS, RPCFit, fit_rpc
 
-# Terms of each model, an axis, from the simplest to the most flexible.
+# Number of terms of each model, an axis, from the simplest to the most flexible.
 SHIFT = "shift"
 TERMS = {SHIFT: 1, "shift_drift": 2, "affine": 3}
 KINDS = tuple(TERMS)
@@ -25,7 +25,7 @@ KINDS = tuple(TERMS)
 
 @dataclass(frozen=True)
 class Bias:
-    """What is added to the image positions of RPCs to make them right.
+    """A correction that is added to the image positions of RPCs.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Bias:
         Column and row of the correction, px, for each term; shape (terms, 2). Terms are 1, the
         row and the column, within ±1 over the image.
     covariance
-        Of the coefficients, raveled, px²; shape (2 terms, 2 terms).
+        Covariance of the raveled coefficients, px²; shape (2 terms, 2 terms).
     """
 
     kind: str
@@ -50,12 +50,12 @@ class Bias:
         return design(self.kind, self.size, np.asarray(px, float)) @ self.coefficients
 
     def shift_px(self) -> tuple[list[float], list[float]]:
-        """Return the correction in the middle of the image (col, row), and its sigma, pixels."""
+        """Return the correction at the centre of the image (col, row), and its sigma, pixels."""
         sigma = np.sqrt(np.diag(self.covariance))[:2]
         return self.coefficients[0].tolist(), sigma.tolist()
 
     def sigma_px(self, px: ArrayLike) -> FloatArray:
-        """Return the standard deviation of the corrections, shape (n,), in pixels."""
+        """Return the standard deviation of the corrections, both axes, shape (n,), in pixels."""
         terms = design(self.kind, self.size, np.asarray(px, float))
         count = terms.shape[1]
         blocks = self.covariance.reshape(count, 2, count, 2)
@@ -63,7 +63,7 @@ class Bias:
         return np.asarray(np.sqrt(np.trace(variance, axis1=1, axis2=2)))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the correction as values that JSON can carry."""
+        """Return the correction as JSON values."""
         names = ("constant", "row", "col")[: len(self.coefficients)]
         sigma = np.sqrt(np.diag(self.covariance)).reshape(-1, 2)
         return {
@@ -86,9 +86,9 @@ def design(kind: str, size: tuple[int, int], px: FloatArray) -> FloatArray:
 
 
 def fold(rpc: RPC, bias: Bias) -> RPCFit:
-    """Return RPCs that a correction is part of, and how far they miss it.
+    """Return RPCs that include a correction, and their largest residual from it.
 
-    A shift moves the offsets, which is exact; other models are taken up by a new fit to positions
+    A shift moves the offsets, which is exact. Other models are absorbed by a new fit to positions
     over the image and the RPCs' range of heights.
     """
     if bias.kind == SHIFT:

@@ -19,29 +19,29 @@ from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json
 
-# Of GDAL, in a raster's tags.
+# Rasters with GDAL's GCPs in their tags.
 RASTERS = (*GEOTIFF, ".vrt")
 ENVI = ".pts"
 SUFFIXES = (*RASTERS, ENVI)
 
-# The first pixel's centre: GDAL counts from that pixel's corner; ENVI, too, and that corner is 1.
+# Position of the first pixel's centre: its corner is at 0 in GDAL, at 1 in ENVI.
 GDAL_FIRST, _ENVI_FIRST = 0.5, 1.5
 
-# The column of heights above the ellipsoid; NaN where one is not known.
+# Column of heights above the ellipsoid; NaN where unknown.
 HEIGHT = "height_m"
 
 
 def read_others(path: Path, image: str) -> TiePoints | None:
     """Read ground control of another program; None if the file has one of our own formats.
 
-    Points have the column `HEIGHT`, and no sigmas.
+    The points have the column `HEIGHT`, but no sigmas.
 
     Parameters
     ----------
     path
         GeoJSON of orthority, a raster with GCPs in its tags (also a VRT), or ENVI's `.pts`.
     image
-        Name of the image: orthority's files may hold points of several.
+        Name of the image: orthority's files may hold points of several images.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def _stem(feature: dict[str, Any]) -> str:
 
 
 def _read_gdal(path: Path, image: str) -> TiePoints:
-    """Read the GCPs of a raster; heights of 0 everywhere are none."""
+    """Read the GCPs of a raster; heights that are all 0 are unknown."""
     with FileHandles(str(path)).borrow() as dataset:
         points, crs = dataset.gcps
     if not points:
@@ -129,7 +129,7 @@ def _read_envi(path: Path, image: str) -> TiePoints:
 
 
 def _envi_crs(comments: str) -> CRS:
-    """Return the CRS of a projection info on WGS 84: a UTM zone, or longitude and latitude."""
+    """Return the CRS of a projection info, on WGS 84: a UTM zone, or longitude and latitude."""
     found = re.search(r"projection info\s*=\s*\{([^}]*)\}", comments, re.IGNORECASE)
     words = [] if found is None else [word.strip().lower() for word in found[1].split(",")]
     units = [word for word in words if re.match(r"units\s*=", word)]

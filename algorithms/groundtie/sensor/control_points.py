@@ -1,4 +1,4 @@
-"""Ground control points: places in the image whose position and height on the ground are known."""
+"""Ground control points: image positions whose ground position and height are known."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from .rpc import RPC
 
 CORRELATION = "sigma_correlation"
 
-# Standard deviation, in pixels, of points that come without one.
+# Standard deviation, in pixels, of points that state none.
 _USUAL_SIGMA_PX = 1.0
 
-# What GDAL takes as `gdal_translate --optfile`.
+# Options for `gdal_translate --optfile`.
 GDAL_SUFFIX = ".txt"
 SUFFIXES = (*TIE_POINT_SUFFIXES, GDAL_SUFFIX)
 READ_SUFFIXES = (*TIE_POINT_SUFFIXES, *OTHER_SUFFIXES)
@@ -56,14 +56,14 @@ class ControlPoints(TiePoints):
 
     @classmethod
     def of(cls, points: TiePoints, height_m: FloatArray, crs: CRS) -> ControlPoints:
-        """Return points of a map with heights, shape (n,); those of unknown height are rejected."""
+        """Return points on a map with heights, shape (n,); those of unknown height are rejected."""
         is_known = np.isfinite(height_m)
         known = vars(points.reject(~is_known, "no height"))
         return cls(**{**known, "crs": crs, "height_m": np.where(is_known, height_m, 0.0)})
 
     @property
     def by_hand(self) -> int:
-        """How many of the points a person moved or added."""
+        """Number of points that a person moved or added."""
         return int(self.edited.sum())
 
     @property
@@ -72,12 +72,12 @@ class ControlPoints(TiePoints):
         return reproject(self.reference_xy, self.crs, LON_LAT)
 
     def seen_by(self, rpc: RPC, size: tuple[int, int]) -> Control:
-        """Return the points as RPCs see them.
+        """Return the points with their image positions by RPCs.
 
         Raises
         ------
         GeoreferencingError
-            They cannot see one that is used.
+            The RPCs cannot place a point that is used.
         """
         expected_px = rpc.project(self.lon_lat, self.height_m)
         self.require_placed(np.isfinite(expected_px).all(axis=1) | ~self.used)
@@ -101,9 +101,9 @@ class ControlPoints(TiePoints):
     def write(self, path: str | os.PathLike[str], orientation: Orientation, grid: Grid) -> None:
         """Write the points in the format that the suffix of `path` names (see `SUFFIXES`).
 
-        Residuals and lines refer to `orientation`: lines lead from where it sees a point on the
-        map to where the point is. `grid` is the image's own. What the CRS of the map may state
-        of heights is left out: those of points count from the ellipsoid.
+        Residuals and lines refer to `orientation`: a line leads from the map position that it gives
+        a point's pixel to the point itself. `grid` is the image's own. A vertical part of the map's
+        CRS is left out: the points' heights are above the ellipsoid.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class ControlPoints(TiePoints):
         transform = Transform.nominal(self.crs, seen)
         if Path(path).suffix.lower() == GEOREFERENCER:
             with writing(path):
-                # It has places in the image where the image's own grid has them.
+                # The Georeferencer's image positions refer to the image's own grid.
                 write_georeferencer(Path(path), self, transform, grid)
             return
         covariance = self.covariance_px2
@@ -133,7 +133,7 @@ class ControlPoints(TiePoints):
         write_tie_points(path, replace(self, more=more), transform)
 
     def _gdal_options(self) -> str:
-        """Return the used points of the fit as options of gdal_translate."""
+        """Return the points of the fit as options of gdal_translate."""
         kept = self.take(self.fit)
         lines = [f"-a_srs {_word(self.crs)}"]
         px = kept.input_px + GDAL_FIRST
@@ -143,9 +143,9 @@ class ControlPoints(TiePoints):
 
 
 def _word(crs: CRS) -> str:
-    """Return a CRS as GDAL's files of options have it."""
+    """Return a CRS as a word of GDAL's option files."""
     name = crs_name(crs)
-    # GDAL quotes what holds blanks or quotes, as JSON does.
+    # GDAL quotes and escapes as JSON does.
     return json.dumps(name, ensure_ascii=False) if '"' in name else name
 
 
@@ -158,25 +158,25 @@ def read_control_points(
     ----------
     path
         A `.gpkg`, `.geojson`, `.csv` or `.points` file (see `geometry.tie_point_files`), or one of
-        another program (see `control_formats`). Points without a height get that of the ground,
-        those without a sigma one of 1 px.
+        another program (see `control_formats`). Points without a height get that of the ground;
+        points without a sigma get one of 1 px.
     orientation
-        Gives heights, and the CRS of the map if the file does not state it.
+        Supplies missing heights, and the CRS of the map if the file does not state it.
     grid
         The image's own grid.
     image
-        Its name: a file of another program may hold points of several images.
+        The image's name: a file of another program may hold points of several images.
 
     Raises
     ------
     TransformFileError
-        The file cannot be read or understood, holds no points, or its CRS states that their heights
-        do not count from the ellipsoid.
+        The file cannot be read or understood, holds no points, or states heights in a CRS whose
+        vertical datum is not the ellipsoid.
     """
     stored = read_others(path, image)
     if stored is None:
-        # The Georeferencer has places in the image where its own geotransform, if any, has them.
-        # Elsewhere they are the image's pixels, wherever the image nominally is.
+        # The Georeferencer's image positions refer to the image's own geotransform, if any. Those
+        # of other formats are pixels, whatever the nominal geotransform.
         is_georeferencer = path.suffix.lower() == GEOREFERENCER
         own = replace(grid, crs=None) if is_georeferencer else grid.on_own_pixels()
         stored = read_tie_points(path, own, (HEIGHT, CORRELATION, *SIGMA))

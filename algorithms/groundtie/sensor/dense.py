@@ -1,8 +1,8 @@
-"""The image position of every pixel of a map grid, as fast as heights can be looked up.
+"""Image positions of all pixels of a map grid, as fast as heights can be looked up.
 
-A sensor model is smooth in position and height; terrain is not. So the model is evaluated at a
-lattice of pixels and three heights that enclose the terrain, and interpolated between them at the
-height of each pixel.
+A sensor model is smooth in position and height; terrain is not. The model is therefore evaluated on
+a lattice of pixels at three heights that enclose the terrain, and interpolated to the height of
+each pixel.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ..rasters.lattice import NOWHERE, Lattice, lattice, row_strips
 from ..rasters.reading import FloatImage
 from .orientation import Orientation
 
-# Heights are enclosed by planes at least so far apart, in metres.
+# Least distance between the three heights, in metres.
 _LEAST_RANGE_M = 10.0
 
-# Of terrain models that are finer than the image, so many pixels a side are held in memory.
+# Most pixels a side of a terrain model held in memory: it may be much finer than the image.
 _LARGEST_PX = 4096
 
 
 @dataclass(frozen=True)
 class DenseOrientation:
-    """An orientation as the function that rasters are warped by: see `lattice.DenseMap`."""
+    """An orientation as a function to warp rasters by: see `lattice.DenseMap`."""
 
     orientation: Orientation
 
@@ -56,7 +56,7 @@ class DenseOrientation:
         middle, reach = (low + high) / 2, max((high - low) / 2, _LEAST_RANGE_M)
 
         def expansion(lon_lat: FloatArray) -> FloatArray:
-            """Return the image position at the middle height, and its change up to the highest."""
+            """Return a, b and c of `_Parabolas`, each a column and a row, shape (n, 6)."""
             below, level, above = (
                 orientation.rpc.project(lon_lat, middle + step * reach) for step in (-1, 0, 1)
             )
@@ -76,12 +76,12 @@ class DenseOrientation:
         return px
 
     def _holds_everywhere(self, grid: Grid, bounds_m: tuple[float, float]) -> bool:
-        """Return whether the RPCs hold at all pixels of a grid and heights within bounds."""
+        """Return whether the RPCs are valid at all pixels of a grid and heights within bounds."""
         outline = self.orientation.to_lon_lat(grid.pixel_to_map(grid.outline(3)))
         return all(self.orientation.rpc.is_valid(outline, bound).all() for bound in bounds_m)
 
     def _lost(self, grid: Grid, height: FloatImage, rows: slice) -> NDArray[np.bool_]:
-        """Return at which pixels of some rows the RPCs do not hold."""
+        """Return a mask of the pixels of some rows at which the RPCs are not valid."""
         xy = grid.pixel_to_map(mesh(np.arange(grid.width), np.arange(grid.height)[rows]))
         lon_lat = self.orientation.to_lon_lat(xy)
         return ~self.orientation.rpc.is_valid(lon_lat, height.ravel()).reshape(height.shape)
@@ -91,14 +91,14 @@ class DenseOrientation:
 class _Parabolas:
     """Image positions as parabolas a + b t + c t² of the height, t from -1 to 1.
 
-    Single precision serves for what differs within a grid.
+    Single precision suffices for differences within a grid.
 
     Parameters
     ----------
     origin
-        Taken from the column and the row, shape (2,).
+        Column and row that are subtracted from a, shape (2,).
     terms
-        a, b and, if it is not negligible, c; each a column and a row.
+        a, b and, unless it is negligible, c; each a column and a row.
     """
 
     origin: FloatArray
@@ -114,7 +114,7 @@ class _Parabolas:
         return cls(origin, kept.minus(np.append(origin, np.zeros(len(kept.values) - 2))))
 
     def at(self, t: FloatImage, rows: slice) -> FloatImage:
-        """Return the positions from the origin, (2, rows, width), at heights t of some rows."""
+        """Return positions relative to the origin, (2, rows, width), at heights t of some rows."""
         coefficients = self.terms.lines(rows).reshape(-1, 2, *t.shape)
         value = coefficients[-1]
         for lower in coefficients[-2::-1]:

@@ -1,4 +1,4 @@
-"""Vertical datums: which one a terrain model declares, and where PROJ's grids of the geoids lie."""
+"""Vertical datums: which one a terrain model declares, and where PROJ's geoid grids lie."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import GeoreferencingError
 
 ELLIPSOIDAL = "ellipsoidal"
 
-# PROJ's grids of the geoids' heights above the ellipsoid, by the names that it had and has.
+# PROJ's grids of geoid heights above the ellipsoid: the file's current and former name.
 _GRIDS = {
     "EGM96": ("us_nga_egm96_15.tif", "egm96_15.gtx"),
     "EGM2008": ("us_nga_egm08_25.tif", "egm08_25.gtx"),
@@ -29,9 +29,9 @@ DATUMS = (ELLIPSOIDAL, *_GRIDS)
 
 
 def declared_datum(crs: CRS | None) -> str | None:
-    """Return what heights count from that a compound CRS names: a name of `DATUMS`, or its own.
+    """Return the vertical datum of a compound CRS: a name of `DATUMS`, or the CRS's own name.
 
-    None: it names nothing, or the ellipsoid.
+    None: the CRS names no datum, or the ellipsoid.
     """
     found = None if crs is None else _VERTICAL.search(crs.to_wkt())
     if found is None or _NO_DATUM.search(found[1]):
@@ -41,13 +41,13 @@ def declared_datum(crs: CRS | None) -> str | None:
 
 
 def horizontal(crs: CRS) -> CRS:
-    """Return a compound CRS without its vertical part; others as they are."""
+    """Return a compound CRS without its vertical part; other CRSs as they are."""
     found = _COMPOUND.match(crs.to_wkt())
     return crs if found is None else CRS.from_wkt(found[1])
 
 
 def find_geoid(datum: str) -> Path | None:
-    """Return the grid of the geoid of a vertical datum; None for the ellipsoid.
+    """Return the geoid grid of a vertical datum; None for the ellipsoid.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def find_geoid(datum: str) -> Path | None:
 
 
 def _proj_folders() -> list[Path]:
-    """Return where PROJ looks for grids."""
+    """Return the folders in which PROJ looks for grids."""
     named = [os.environ.get(key, "") for key in ("PROJ_DATA", "PROJ_LIB")]
     own = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "proj"
     folders = [Path(part) for text in named for part in text.split(os.pathsep) if part]

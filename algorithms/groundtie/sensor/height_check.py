@@ -1,9 +1,8 @@
-"""Whether heights fit the RPCs: what they indicate of a wrong vertical datum, and what not.
+"""Check whether heights fit the RPCs, as evidence of a wrong vertical datum.
 
-All heights being wrong by the same moves the image positions by nearly the same everywhere, as a
-shift of the RPCs does, whatever the relief: a refinement takes it up, and residuals do not show
-it. What may show it are the range of heights that the RPCs were made for, and heights that the
-control points themselves have.
+A constant error of all heights moves image positions by nearly the same everywhere, whatever the
+relief. A refinement absorbs it as a shift of the RPCs, so that residuals do not show it. The range
+of heights that the RPCs were made for may show it, and so may the control points' own heights.
 """
 
 from __future__ import annotations
@@ -19,20 +18,20 @@ from .geoids import find_geoid
 from .heights import ConstantHeight, surface_over
 from .orientation import FloatArray, Orientation, seen_at
 
-# Heights that are off by more get a warning, in metres: terrain models err by a few, geoids lie
+# Largest height offset without a warning, in metres: terrain models err by a few metres, geoids lie
 # tens from the ellipsoid.
 _OFFSET_M = 10.0
 
-# Ground beyond the RPCs' range of heights must be so, too, by more than this share of its half.
+# The ground must also leave the RPCs' range of heights by more than this share of half the range.
 _BEYOND_SHARE = 0.05
 
-# Shares of the ground that are left out at both ends of its range.
+# Share of the ground's heights that is left out at either end of their range.
 _TAIL = 0.01
 
 
 @dataclass(frozen=True)
 class HeightCheck:
-    """What indicates the vertical datum of the heights.
+    """Evidence of the vertical datum of the heights.
 
     Parameters
     ----------
@@ -41,7 +40,8 @@ class HeightCheck:
     range_m
         Lowest and highest height that the RPCs were made for.
     geoid_m
-        Height of the geoid EGM96 above the ellipsoid; None: its grid is not installed.
+        Height of the geoid EGM96 above the ellipsoid; None: its grid cannot be read, or the height
+        is constant.
     control_offset_m
         Median of the control points' own heights minus the ground's; None: they have none.
     """
@@ -53,17 +53,17 @@ class HeightCheck:
 
     @property
     def beyond_m(self) -> float:
-        """How far the ground leaves the RPCs' range: below (negative) or above it."""
+        """Distance by which the ground leaves the RPCs' range: below (negative) or above it."""
         below = min(self.ground_m[0] - self.range_m[0], 0.0)
         above = max(self.ground_m[1] - self.range_m[1], 0.0)
         return below if -below > above else above
 
     def summary(self) -> dict[str, Any]:
-        """Return the check as values that JSON can carry."""
+        """Return the check as JSON values."""
         return asdict(self) | {"warnings": self.warnings()}
 
     def warnings(self) -> list[str]:
-        """Return in words what indicates wrong heights."""
+        """Return warnings of wrong heights."""
         found = []
         scale = (self.range_m[1] - self.range_m[0]) / 2
         if abs(self.beyond_m) > max(_OFFSET_M, _BEYOND_SHARE * scale):
@@ -91,7 +91,7 @@ def check_heights(
     Parameters
     ----------
     orientation
-        How the image sees the ground.
+        The image's orientation.
     size
         Width and height of the image, in pixels.
     control_offset_m

@@ -1,4 +1,4 @@
-"""Heights above the ellipsoid: constant, or of a raster whose vertical datum is known."""
+"""Heights above the ellipsoid: constant, or from a raster whose vertical datum is known."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from ..rasters.lattice import Lattice
 from ..rasters.reading import FloatImage, RasterSource
 from .smooth_map import smooth_map
 
-# Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and its largest error; returns
-# its values for all pixels of a grid.
+# Takes a smooth function of longitude and latitude, (n, 2) → (n, k), and the largest tolerated
+# error; returns the function's values for all pixels of a grid.
 OnNodes = Callable[[PointFunction, float], Lattice]
 
-# Interpolation between nodes may be wrong by this, in metres.
+# Largest error of interpolation between nodes, in metres.
 _TOLERANCE_M = 1e-3
 
-# Grids of the whole Earth leave this much open where they meet themselves.
+# Largest gap of global grids where their first and last columns meet, in pixels.
 _WHOLE_PX = 1.0
 
 
@@ -86,7 +86,8 @@ class TerrainHeights:
     terrain
         The model.
     geoid
-        What its heights count from, as heights above the ellipsoid; None: the ellipsoid.
+        Geoid that the model's heights count from, as heights above the ellipsoid; None: they count
+        from the ellipsoid.
     """
 
     terrain: RasterSurface
@@ -94,12 +95,12 @@ class TerrainHeights:
 
     @property
     def typical_m(self) -> float:
-        """A height of the region: its median, and the geoid's."""
+        """A height of the region: the median of the terrain model plus that of the geoid."""
         geoid = 0.0 if self.geoid is None else float(np.median(self.geoid.filled))
         return float(np.median(self.terrain.filled)) + geoid
 
     def is_measured(self, lon_lat: FloatArray) -> NDArray[np.bool_]:
-        """Return where, shape (n,), heights are the terrain model's own, not filled into voids."""
+        """Return where heights are the terrain model's own, not filled into voids, shape (n,)."""
         return self.terrain.is_measured(lon_lat) & np.isfinite(self.at(lon_lat))
 
     def at(self, lon_lat: FloatArray) -> FloatArray:
@@ -110,7 +111,7 @@ class TerrainHeights:
         return heights
 
     def on_grid(self, grid: Grid, on_nodes: OnNodes) -> HeightsOnGrid | None:
-        """Return the heights at all pixels of a grid; None if none is known."""
+        """Return the heights at all pixels of a grid; None if no height is known."""
         place = on_nodes(self.terrain.to_px, POSITION_ERROR_PX)
         geoid = None
         if self.geoid is not None:
@@ -131,9 +132,9 @@ class _TerrainOnGrid:
     heights
         The model.
     corners
-        Its pixels between which the grid lies, shape (n, 2).
+        Positions in the model that enclose the grid, shape (n, 2).
     place
-        Where the grid's pixels lie in the model, its columns and rows.
+        Columns and rows of the grid's pixels in the model.
     geoid
         Heights of the geoid.
     """
@@ -145,7 +146,7 @@ class _TerrainOnGrid:
 
     @property
     def side_px(self) -> float:
-        """How many pixels of the model lie along the grid."""
+        """Number of the model's pixels along the grid's longer side."""
         return float(np.ptp(self.corners, axis=0).max())
 
     @cached_property
@@ -162,7 +163,7 @@ class _TerrainOnGrid:
         image = self._piece.image
         geoid = np.zeros(1) if self.geoid is None else self.geoid.values
         low, high = float(np.nanmin(geoid)), float(np.nanmax(geoid))
-        # Of a piece without heights no pixel is looked up.
+        # Bounds of 0 do no harm to a piece without heights: all its pixels are unknown.
         lowest, highest = np.nan_to_num([np.fmin.reduce(image, None), np.fmax.reduce(image, None)])
         return float(lowest) + low, float(highest) + high
 
@@ -186,13 +187,13 @@ def terrain_heights(
     Parameters
     ----------
     dem
-        The terrain model, of any CRS; voids are filled from their rims, but not those that are open
-        to the region's edge.
+        The terrain model, in any CRS. Voids are filled from their rims, unless they are open to the
+        region's edge.
     geoid
         Heights of the geoid that the model's heights count from; None: they count from the
         ellipsoid.
     lon_lat
-        Places of the region, shape (n, 2): those in between are asked for, too.
+        Positions that enclose the region, shape (n, 2).
 
     Raises
     ------
@@ -209,12 +210,12 @@ def terrain_heights(
 
 
 def require_crs(source: RasterSource) -> CRS:
-    """Return a raster's CRS: RPCs lead to longitude and latitude.
+    """Return a raster's CRS, which relates it to the longitudes and latitudes of RPCs.
 
     Raises
     ------
     GeoreferencingError
-        It has none.
+        The raster has no CRS.
     """
     if source.grid.crs is None:
         raise GeoreferencingError(f"{source.path} has no CRS")
@@ -229,7 +230,7 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     source
         The raster.
     lon_lat
-        Places of the region, (n, 2): those in between are asked for, too.
+        Positions that enclose the region, shape (n, 2).
 
     Raises
     ------

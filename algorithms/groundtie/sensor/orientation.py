@@ -26,25 +26,25 @@ from .heights import ConstantHeight, Heights, terrain_heights
 from .rpc import RPC, VALID_RANGE, image_places
 from .smooth_map import smooth_map
 
-# Heights found by intersecting a line of sight with the terrain are right to this, in metres.
+# Precision of heights at which lines of sight intersect the terrain, in metres.
 _PRECISION_M = 1e-4
 
-# The most steps until then; what needs more is taken for lost.
+# Most steps of the intersection; lines of sight that need more meet no ground.
 _STEPS = 60
 
-# Longitudes and latitudes from map positions may be wrong by this: 0.1 mm.
+# Largest error of longitudes and latitudes from map positions: 0.1 mm.
 _TOLERANCE_DEG = 1e-9
 
-# The map around the image that can be projected into it, as a share of the image's side.
+# Margin of the map around the image that can be projected into it, as a share of the image's side.
 _AROUND = 0.5
 
-# Places a side of an image at which its ground is looked at: shares of it are right to 1 %.
+# Samples along each side of an image: shares of its ground are right to 1 %.
 _NODES = 64
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """How an image sees the ground.
+    """The relation of an image to the ground.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Orientation:
     to_lon_lat
         From map positions to longitude and latitude, shapes (n, 2).
     known_share
-        Share of the image whose heights are known, by the terrain model's own values.
+        Share of the image whose heights are the terrain model's own values.
     filled_share
         Share of the image whose heights are filled into voids from their rims.
     """
@@ -72,7 +72,7 @@ class Orientation:
     def to_px(self, xy: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of map positions.
 
-        NaN where the height is not known or the RPCs do not hold.
+        NaN where the height is not known or the RPCs are not valid.
         """
         lon_lat = self.to_lon_lat(np.asarray(xy, float))
         height = self.heights.at(lon_lat)
@@ -85,7 +85,7 @@ class Orientation:
         return self.heights.at(self.to_lon_lat(np.asarray(xy, float)))
 
     def to_map(self, px: ArrayLike) -> FloatArray:
-        """Return the map positions, shape (n, 2), that image positions see.
+        """Return the map positions, shape (n, 2), of image positions.
 
         NaN where the line of sight does not meet the ground.
         """
@@ -93,7 +93,7 @@ class Orientation:
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_nominal_map(self, px: ArrayLike) -> FloatArray:
-        """Return as `to_map`, at a typical height where lines of sight meet no known ground."""
+        """Return `to_map`, but at a typical height where lines of sight meet no known ground."""
         px = np.asarray(px, float)
         xy = self.to_map(px)
         lost = ~np.isfinite(xy).all(axis=1)
@@ -102,12 +102,12 @@ class Orientation:
         return np.where(np.isfinite(xy), xy, np.nan)
 
     def to_level_map(self, px: ArrayLike) -> FloatArray:
-        """Return the map positions, shape (n, 2), that image positions see at a typical height."""
+        """Return the map positions, shape (n, 2), of image positions at a typical height."""
         level = self.rpc.localise(px, self.heights.typical_m)
         return _on_map(level, self.rpc, self.crs)
 
     def _ground(self, px: FloatArray) -> FloatArray:
-        """Return longitude and latitude, (n, 2), that image positions see; NaN: none.
+        """Return longitude and latitude, (n, 2), of image positions; NaN where there is no ground.
 
         The height at which the line of sight meets the ground is found by the secant method.
         """
@@ -130,7 +130,7 @@ class Orientation:
         return lon_lat
 
     def _above(self, px: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines of sight have a height, and how far the ground lies above them."""
+        """Return positions of lines of sight at heights, and the ground's heights above them."""
         lon_lat = self.rpc.localise(px, height)
         return lon_lat, self.heights.at(lon_lat) - height
 
@@ -139,14 +139,14 @@ class Orientation:
 class SensorGrid(Grid):
     """The pixels of an image that is located by its orientation.
 
-    To all that asks where pixels lie on the map it is a grid as any other, also where heights are
-    not known; what asks for pixels finds none there. Its geotransform is an approximation, good for
-    pixel sizes.
+    All pixels have a map position, as in any grid, at a typical height where the ground's is not
+    known; map positions of unknown height have no pixel. The geotransform is an approximation, good
+    for pixel sizes.
 
     Parameters
     ----------
     orientation
-        How the image sees the ground.
+        The image's orientation.
     """
 
     orientation: Orientation
@@ -179,14 +179,14 @@ def orient(
     dem
         A terrain model; None: the height is the same everywhere.
     geoid
-        What the model's heights count from; None: the ellipsoid (see `terrain_heights`).
+        Geoid that the model's heights count from; None: the ellipsoid (see `terrain_heights`).
     height_m
-        Height above the ellipsoid where there is no terrain model; None: that of the RPCs.
+        Height above the ellipsoid without a terrain model; None: the RPCs' height offset.
 
     Raises
     ------
     NoOverlapError
-        The terrain model covers nothing of the image.
+        The terrain model covers nothing of the image, or the image lies outside of the map's CRS.
     GeoreferencingError, RasterContentError
         See `terrain_heights`.
     """
@@ -223,9 +223,9 @@ def orient(
 
 
 def _on_map(lon_lat: FloatArray, rpc: RPC, crs: CRS) -> FloatArray:
-    """Return map positions, (n, 2), of longitudes and latitudes as RPCs have them.
+    """Return map positions, (n, 2), of longitudes and latitudes of RPCs.
 
-    Longitudes of the map, too, go on across the antimeridian.
+    If the map has longitudes, they continue across the antimeridian as those of the RPCs.
     """
     x = reproject(np.array([rpc.offset[:2]]), LON_LAT, crs)[0, 0]
     return near_longitude(reproject(lon_lat, LON_LAT, crs), x, crs)
@@ -237,7 +237,7 @@ def seen_at(rpc: RPC, size: tuple[int, int], height_m: float) -> FloatArray:
     Raises
     ------
     GeoreferencingError
-        The RPCs see no ground: they are not the image's.
+        The RPCs lead no pixel to the ground: they belong to another image.
     """
     seen = finite(rpc.localise(*image_places(size, [height_m], _NODES)))
     if not len(seen):

@@ -1,7 +1,7 @@
 """Polynomials of positions, evaluated block by block so that all intermediates stay in cache.
 
 The terms of a block form a matrix; one product with the coefficients gives all polynomials.
-numpy releases the interpreter's lock for both, so that threads can do so side by side.
+numpy releases the interpreter's lock for both, so that threads run in parallel.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ EXPONENTS = (
 TERMS = len(EXPONENTS)
 _QUADRATIC = sum(sum(term) <= 2 for term in EXPONENTS)
 
-# Their terms of degree above 1 as products: of which earlier term, and of which coordinate.
+# Terms of degree above 1 as products: index of an earlier term, and of a coordinate.
 RPC_PRODUCTS = (
     (1, 1), (1, 2), (2, 2), (1, 0), (2, 1), (3, 2), (4, 2), (7, 0),
     (8, 0), (9, 0), (7, 1), (8, 1), (9, 1), (7, 2), (8, 2), (9, 2),
 )  # fmt: skip
 
-# Points whose terms fit into the cache of a core.
+# Number of points whose terms fit into the cache of a core.
 BLOCK = 4096
 
 
@@ -41,11 +41,11 @@ def fill_terms(
     Parameters
     ----------
     positions
-        Shape (k, n); of RPCs normalised longitude, latitude and height.
+        Shape (k, n); for RPCs, normalised longitude, latitude and height.
     terms
-        Is written, shape (1 + k + products, n).
+        The output, shape (1 + k + products, n).
     products
-        The terms of degree above 1: of which earlier term, and of which coordinate.
+        The terms of degree above 1: index of an earlier term, and of a coordinate.
     """
     terms[0] = 1.0
     terms[1 : 1 + len(positions)] = positions
@@ -63,7 +63,7 @@ def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
     coefficients
         One polynomial a row.
     coordinate
-        By which to derive: 0 longitude, 1 latitude, 2 height.
+        The coordinate to differentiate by: 0 longitude, 1 latitude, 2 height.
     """
     lower = np.zeros((len(coefficients), _QUADRATIC))
     for term, exponents in enumerate(EXPONENTS):
@@ -75,12 +75,12 @@ def derivative(coefficients: FloatArray, coordinate: int) -> FloatArray:
 
 
 def in_blocks(work: Callable[[slice, FloatArray], None], count: int, terms: int = TERMS) -> None:
-    """Call `work` for all blocks of `count` points, with a matrix for the terms of each.
+    """Call `work` for each block of `count` points, with a matrix for its terms.
 
     Parameters
     ----------
     work
-        Takes the points' range and a matrix, (terms, points), that it may overwrite.
+        Takes the points' range and a matrix, (terms, points), to overwrite.
     count
         Number of points.
     terms

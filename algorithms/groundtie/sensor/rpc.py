@@ -16,18 +16,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..rasters.grid import LON_LAT, FloatArray, near_longitude
 from .polynomials import TERMS, derivative, fill_terms, in_blocks
 
-# The inverse has arrived when it misses the image position by less, in pixels.
+# The inverse has converged when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
 
-# The most steps until then: usually it is one (see `_Start`).
+# Most steps until convergence; usually there is one (see `_Start`).
 _STEPS = 12
 
-# Beyond this multiple of their scales ground positions are none of the image's.
+# Ground positions beyond this multiple of the RPCs' scales lie outside of the image.
 VALID_RANGE = 1.5
 
 _HALF_TURN_DEG = 180.0
 
-# Nodes a side, along the ground and along height, of the positions that the inverse starts from.
+# Nodes along longitude, latitude and height of the positions that the inverse's start is fitted to.
 _START_NODES = (9, 9, 5)
 
 
@@ -42,8 +42,8 @@ class RPC:
     image_offset, image_scale
         Of column (sample) and row (line), in pixels; the first pixel's centre is at (0, 0).
     polynomials
-        The twenty coefficients, in the order of RPC00B, of numerator and denominator of the sample,
-        and of those of the line.
+        Twenty coefficients each, in the order of RPC00B: numerator and denominator of the sample,
+        numerator and denominator of the line.
     error_bias_m, error_random_m
         Root mean square errors that the supplier states, metres; None: not stated.
     """
@@ -89,7 +89,7 @@ class RPC:
         px = np.empty((len(lon_lat), 2))
 
         def work(part: slice, terms: FloatArray) -> None:
-            # What lies outside of its map's projection is infinite.
+            # Positions outside of their map projection are infinite.
             with np.errstate(all="ignore"):
                 fill_terms(self._normalised(lon_lat[part], height[part]), terms)
                 values = self._coefficients @ terms
@@ -121,14 +121,14 @@ class RPC:
     def localise(self, px: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return longitude and latitude, shape (n, 2), of image positions at given heights.
 
-        By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it finds nothing.
+        By Newton's method with the analytic Jacobian, to 1e-7 px; NaN where it does not converge.
 
         Parameters
         ----------
         px
             Image positions (col, row), shape (n, 2).
         height_m
-            As `project` has it.
+            As in `project`.
         """
         px, height = _at_heights(px, height_m)
         found = np.empty((len(px), 2))
@@ -147,18 +147,18 @@ class RPC:
         return found
 
     def heights_m(self, scales: float = 1.0) -> tuple[float, float]:
-        """Return the lowest and highest height within so many scales of the offset.
+        """Return the lowest and highest height within a number of scales of the offset.
 
-        They were made for one; up to `VALID_RANGE` they may be used (see `is_valid`).
+        RPCs are made for one scale, and may be used up to `VALID_RANGE` scales (see `is_valid`).
         """
         reach = scales * abs(self.scale[2])
         return self.offset[2] - reach, self.offset[2] + reach
 
     def is_valid(self, lon_lat: ArrayLike, height_m: ArrayLike) -> NDArray[np.bool_]:
-        """Return which ground positions lie where the coefficients may be used, shape (n,).
+        """Return at which ground positions the coefficients may be used, shape (n,).
 
-        That is within 1.5 times the scales around the offsets: farther off, the polynomials may
-        lead positions of other places back into the image. Parameters as `project`.
+        They are valid within 1.5 times the scales around the offsets: farther off, the polynomials
+        may project ground outside of the scene into the image. Parameters as `project`.
         """
         lon_lat, height = _at_heights(lon_lat, height_m)
         inside = np.abs(self._normalised(lon_lat, height)) <= VALID_RANGE
@@ -174,7 +174,7 @@ class RPC:
         lph = np.empty((3, len(lon_lat)))
         for axis, values in enumerate((lon_lat[:, 0], lon_lat[:, 1], height)):
             np.subtract(values, self.offset[axis], out=lph[axis])
-        # Across the antimeridian longitudes begin anew.
+        # Longitudes jump at the antimeridian.
         if (np.abs(lph[0]) > _HALF_TURN_DEG).any():
             lph[:2] = near_longitude(lph[:2].T, 0.0, LON_LAT).T
         lph *= 1 / np.array(self.scale)[:, None]
@@ -200,7 +200,7 @@ class RPC:
 
     @property
     def is_regular(self) -> bool:
-        """Whether no denominator vanishes within the scales, and the ground has an image there."""
+        """Whether no denominator vanishes within the scales, and column and row vary there."""
         values = self._coefficients @ _ground_terms()[1]
         low, high = values[2:].min(axis=1), values[2:].max(axis=1)
         if not (low * high > 0).all():
@@ -216,7 +216,7 @@ class RPC:
 def image_places(
     size: tuple[int, int], heights_m: ArrayLike, nodes: int = 21
 ) -> tuple[FloatArray, FloatArray]:
-    """Return positions all over an image, each at several heights: what `localise` takes.
+    """Return positions all over an image, each at several heights, as `localise` takes them.
 
     Parameters
     ----------
@@ -241,8 +241,8 @@ def image_places(
 class _Start:
     """Cubic polynomials from image position and height to longitude and latitude, normalised.
 
-    They are fitted over the whole range of the RPCs, and right to a few pixels: from there,
-    Newton's method needs one step.
+    They are fitted over the whole range of the RPCs and right to a few pixels, so that Newton's
+    method needs one step.
     """
 
     low: FloatArray
@@ -267,7 +267,7 @@ class _Start:
 
 
 def _at_heights(positions: ArrayLike, height_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return positions, (n, 2), and a height for each, (n,): its own, or the one of all."""
+    """Return positions, (n, 2), and the height of each, (n,)."""
     places = np.asarray(positions, float)
     return places, np.broadcast_to(np.asarray(height_m, float), len(places))
 

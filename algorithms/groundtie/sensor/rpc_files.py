@@ -1,7 +1,7 @@
 """RPCs in files: GeoTIFF tags, `_RPC.TXT`, `.RPB`, and the RPC XML of DIMAP 2 and 3.
 
-DIMAP 2 is of Pléiades and SPOT, 3 of Pléiades Neo. All are taken to the names of GDAL's metadata
-domain first (see `rpc_tags`).
+DIMAP 2 comes with Pléiades and SPOT, DIMAP 3 with Pléiades Neo. All formats are first converted to
+the names of GDAL's metadata domain (see `rpc_tags`).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from .rpc_tags import POLYNOMIALS, rpc_from_tags, rpc_to_tags
 
 Tags = dict[str, str]
 
-# Places in RPC00B of the terms of RPC00A [NGA2000]: there, the product of all three comes first
-# among the squares, and cubic terms by the power of longitude, latitude and height.
+# Index in RPC00B of each term of RPC00A [NGA2000]. RPC00A has the product of all three coordinates
+# before the squares, and cubic terms by the power of longitude, latitude and height.
 _RPC00A = (0, 1, 2, 3, 4, 5, 6, 10, 7, 8, 9, 11, 14, 17, 12, 15, 18, 13, 16, 19)
 
-# How the names of tiles of DIMAP products end: row and column. The first begins as the image.
+# End of the names of DIMAP tiles: row and column. The first tile has the image's origin.
 _TILE = re.compile(r"_R(\d+)C(\d+)$", re.IGNORECASE)
 
-# GDAL's names of what lies in ZIP archives.
+# Prefix of GDAL's names of files in ZIP archives.
 _ZIP = "/vsizip/"
 
 # Names in .RPB files, and those in GDAL's domain.
@@ -52,7 +52,7 @@ _RPB_NAMES = {
     "sampDenCoef": "SAMP_DEN_COEFF",
 }
 
-# Of what `_RPC.TXT` does not state in metres.
+# Units other than metres in `_RPC.TXT`.
 _UNITS = {"LINE": "pixels", "SAMP": "pixels", "LAT": "degrees", "LONG": "degrees"}
 
 
@@ -64,13 +64,13 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
     source
         The raster; GDAL has found RPCs in its tags, or in files beside it.
     path
-        A file with other RPCs to use in their place.
+        A file with RPCs to use instead.
 
     Raises
     ------
     GeoreferencingError
-        There are none, they cannot be understood, or they are of the image of which the raster is
-        a tile.
+        There are no RPCs, they cannot be understood, or they belong to the whole image of which the
+        raster is a tile.
     """
     if path is not None:
         _require_whole(source, path)
@@ -81,7 +81,7 @@ def rpc_of(source: RasterSource, path: str | os.PathLike[str] | None = None) -> 
             f"{source.path} has no RPCs; give the file that holds them (_RPC.TXT, .RPB, RPC .XML)"
         )
     for name in source.files():
-        # GDAL takes the terms of RPC00A for those of RPC00B.
+        # GDAL reads coefficients of RPC00A in the order of RPC00B.
         if name.lower().endswith(".rpb") and _is_rpc00a(name):
             return read_rpc(name)
     return rpc_from_tags(tags, source.path)
@@ -101,7 +101,7 @@ def _is_rpc00a(name: str) -> bool:
     try:
         return _spec_id(_text_of(name, "replace")) == "RPC00A"
     except OSError:
-        # What only GDAL can read, as on another machine or in another archive, is left to it.
+        # Files that only GDAL can read, as on another machine or in other archives, are left to it.
         return False
 
 
@@ -109,7 +109,7 @@ def _text_of(name: str, errors: str = "strict") -> str:
     """Return the text of a file, also of one in a ZIP archive; raises `OSError`."""
     if not name.startswith(_ZIP):
         return Path(name).read_text("utf-8-sig", errors)
-    # GDAL may have the archive in braces.
+    # GDAL may name the archive in braces.
     path = Path(re.sub("[{}]", "", name.removeprefix(_ZIP)))
     archive = next((folder for folder in path.parents if folder.is_file()), path)
     try:
@@ -181,14 +181,14 @@ def _read_rpb(text: str) -> Tags:
     kind = _spec_id(text)
     if kind not in ("RPC00A", "RPC00B"):
         raise ValueError(f"coefficients of kind {kind} are not supported, only RPC00A and RPC00B")
-    # From the start of a word only: a text of one long word is none of quadratic work.
+    # Matches begin at the start of a word, or a text of one long word would take quadratic time.
     pairs = re.findall(r"\b(\w+)\s*=\s*(\([^)]*\)|[^;\n]*)", text)
     tags = {_RPB_NAMES[key]: value.strip("() \r;") for key, value in pairs if key in _RPB_NAMES}
     return _from_rpc00a(tags) if kind == "RPC00A" else tags
 
 
 def _spec_id(text: str) -> str:
-    """Return which order of coefficients an `.RPB` states, RPC00B by default."""
+    """Return the order of coefficients that an `.RPB` states, RPC00B by default."""
     found = re.search(r'SpecId\s*=\s*"?(\w+)', text, re.IGNORECASE)
     return found[1].upper() if found else "RPC00B"
 
@@ -214,7 +214,7 @@ def _write_rpb(tags: Tags) -> str:
 
 
 def _read_dimap(text: str) -> Tags:
-    """Read DIMAP 2 or 3: there, the inverse model leads from the ground to the image."""
+    """Read DIMAP 2 or 3, where the inverse model leads from the ground to the image."""
     root = ElementTree.fromstring(text)
     model, first = root.find(".//Global_RFM/Inverse_Model"), 1
     if model is None:
@@ -231,7 +231,7 @@ def _read_dimap(text: str) -> Tags:
 
 
 def _dimap3_first(root: ElementTree.Element) -> int:
-    """Return what DIMAP 3 (Pléiades Neo) calls the first line and sample, which it may choose."""
+    """Return the number of the first line and sample in DIMAP 3 (Pléiades Neo): 0 or 1."""
     domain = ".//ImagetoGround_Validity_Domain/FIRST_"
     firsts = {root.findtext(domain + name, "").strip() for name in ("ROW", "COL")}
     numbers = {float(text) for text in firsts if text}
@@ -241,7 +241,7 @@ def _dimap3_first(root: ElementTree.Element) -> int:
 
 
 def _joined(tags: Tags) -> Tags:
-    """Join the twenty coefficients of a polynomial, each under a name of its own."""
+    """Join the twenty coefficients of each polynomial, which have a name of their own each."""
     joined = {key: value for key, value in tags.items() if "COEFF" not in key}
     for key in POLYNOMIALS:
         words = [tags[f"{key}_{i}"] for i in range(1, 21) if f"{key}_{i}" in tags]

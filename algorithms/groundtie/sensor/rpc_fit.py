@@ -1,4 +1,4 @@
-"""Fitting RPCs to positions on the ground and in the image."""
+"""Fitting RPCs to pairs of ground and image positions."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .rpc import RPC
 # Unknowns of a ratio: two polynomials, less the denominator's first coefficient, which is 1.
 _UNKNOWNS = 2 * TERMS - 1
 
-# Coefficients that the ground positions hardly determine are kept small: a perspective image, for
-# one, leaves many of them open. Of the size of an exact fit's rounding errors.
+# Keeps coefficients small that the ground positions hardly determine: a perspective image, for one,
+# leaves many undetermined. It is of the size of an exact fit's rounding errors.
 _RIDGE = 1e-9
 
-# Heights, over the range that RPCs are to hold for, of the positions that they are fitted to.
+# Number of heights, over the RPCs' range, of the positions that they are fitted to.
 HEIGHTS = 7
 
-# The denominator weighs the residuals; it is known better after each fit.
+# Number of fits: the denominator, which weights the residuals, improves with each.
 _FITS = 4
 
 
 @dataclass(frozen=True)
 class RPCFit:
-    """Fitted RPCs, and how far they miss at most: the largest residual, in pixels."""
+    """Fitted RPCs, and the largest residual of the fit, in pixels."""
 
     rpc: RPC
     largest_residual_px: float
@@ -38,8 +38,8 @@ class RPCFit:
 def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: Any) -> RPCFit:
     """Fit RPCs to pairs of ground and image positions by regularised least squares.
 
-    The equations are linearised by multiplying with the denominator, and weighted by what the fit
-    before found it to be [Tao2001].
+    The equations are linearised by multiplying with the denominator, and weighted by the inverse of
+    the denominator of the previous fit [Tao2001].
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def fit_rpc(lon_lat: ArrayLike, height_m: ArrayLike, px: ArrayLike, **stated: An
     px
         Image positions (col, row), shape (n, 2).
     stated
-        Further fields of `RPC`, as its errors.
+        Further fields of `RPC`, such as its errors.
 
     Raises
     ------

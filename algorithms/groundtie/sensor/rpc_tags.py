@@ -1,4 +1,4 @@
-"""RPCs as GDAL's metadata domain RPC: what GeoTIFF tags and all other files become in GDAL.
+"""RPCs in GDAL's metadata domain RPC, which GDAL fills from GeoTIFF tags and all other files.
 
 https://gdal.org/en/stable/development/rfc/rfc22_rpc.html
 """
@@ -17,14 +17,14 @@ POLYNOMIALS = ("SAMP_NUM_COEFF", "SAMP_DEN_COEFF", "LINE_NUM_COEFF", "LINE_DEN_C
 
 
 def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
-    """Return the RPCs that tags hold.
+    """Return the RPCs in tags.
 
     Parameters
     ----------
     tags
         GDAL's metadata domain RPC.
     name
-        Of the file, for errors.
+        Name of the file, for errors.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
         return float(tags[key].split()[0])  # a unit may follow
 
     def error_m(key: str) -> float | None:
-        # GDAL writes -1 for what is not known.
+        # GDAL writes -1 for an unknown error.
         return None if not tags.get(key) or number(key) < 0 else number(key)
 
     try:
@@ -58,10 +58,10 @@ def rpc_from_tags(tags: Mapping[str, str], name: str) -> RPC:
 
 
 def _require_earthly(rpc: RPC) -> None:
-    """Raise ValueError for RPCs that are of no image of the Earth.
+    """Raise ValueError for RPCs that belong to no image of the Earth.
 
-    Offsets and scales are bounded by all round the Earth, the height of its atmosphere, and the
-    pixels that GDAL counts along a side.
+    Offsets and scales are bounded by the extent of the Earth, the height of its atmosphere, and the
+    largest side that GDAL allows, in pixels.
     """
     for name, largest, numbers in (
         ("longitude", 360.0, (rpc.offset[0], rpc.scale[0])),

@@ -14,7 +14,7 @@ _DEGREE = 5
 # Nodes a side: twice as many as the polynomial has coefficients along one.
 _NODES = 2 * (_DEGREE + 1)
 
-# Random places at which the polynomial is compared with what it stands for.
+# Random positions at which the polynomial is compared with the exact function.
 _CHECKS = 400
 
 # Each term of degree above 1 is one of lower degree times u (0) or v (1), by rising degree.
@@ -31,7 +31,8 @@ def smooth_map(
 ) -> PointFunction:
     """Return a polynomial of degree 5 in place of a function over a box, or the function itself.
 
-    That where no polynomial is exact. Outside of the box the polynomial is NaN.
+    The function itself, if the polynomial is not accurate enough. Outside of the box the polynomial
+    is NaN.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def smooth_map(
     low, high
         Corners of the box, shape (2,).
     tolerance
-        Largest error, in the result's unit, that is found at other places than those of the fit.
+        Largest error at random positions in the box, in the result's unit.
     """
     nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)  # Chebyshev's
     unit = np.stack(np.meshgrid(nodes, nodes)).reshape(2, -1)
@@ -60,7 +61,7 @@ def smooth_map(
 def _polynomial(
     low: FloatArray, high: FloatArray, coefficients: FloatArray, xy: FloatArray
 ) -> FloatArray:
-    """Return positions, (n, 2), by coefficients, (2, 21), of positions in a box; NaN elsewhere."""
+    """Return the polynomial, (n, 2), with coefficients (2, 21), at positions; NaN outside a box."""
     moved = np.empty((len(xy), 2))
 
     def work(part: slice, terms: FloatArray) -> None:

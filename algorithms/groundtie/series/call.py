@@ -36,18 +36,18 @@ from .stored import UNFINISHED, StoredSeries, keep_unfinished, read_series
 
 @dataclass(frozen=True)
 class SeriesCall:
-    """How a series is registered, and what it leaves.
+    """The call of a series registration: inputs, settings and outputs.
 
     Parameters
     ----------
     listed
         All dates, the reference among them.
     reference
-        The reference's name; None: there is none.
+        The reference's name; None: there is no reference.
     settings
         How each pair is registered.
     files
-        What is written, and where.
+        The files to write.
     parameters
         All parameters of the tool.
     """
@@ -65,7 +65,7 @@ class SeriesCall:
         Raises
         ------
         ParameterError, SameFileError
-            They do not go together, or name what is not there.
+            The values contradict each other, or name a file that does not exist.
         """
         listed, reference = _listed(given)
         _require_names_that_fit(listed, reference)
@@ -89,7 +89,7 @@ class SeriesCall:
         progress
             Receives every step.
         executor
-            Runs registrations in the place of threads and of the scheduler; it stays open.
+            Runs registrations instead of threads and the scheduler; it stays open.
 
         Raises
         ------
@@ -128,7 +128,7 @@ class SeriesCall:
         hub = next((k for k, date in enumerate(dates) if date.name == self.reference), None)
         home = dates[hub or 0]
         key = None if hub is None else home.key
-        frame = stored.frames.get(key)  # that of the registrations which need not be done again
+        frame = stored.frames.get(key)  # stored registrations refer to it
         if frame is None or not frame.is_of(home.source.grid):
             frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
         footprints = [date.footprint(frame.grid.crs) for date in dates]
@@ -177,7 +177,7 @@ def _listed(given: Mapping[str, Any]) -> tuple[tuple[Listed, ...], str | None]:
     dates, name = list_dates(given["inputs"], given["asset"]), None
     if given["reference"] is not None:
         (reference,) = list_dates([given["reference"]], None)
-        # In its place and by its name, if it is a date of the series.
+        # A reference that is a date of the series keeps its place and its name.
         same = next((k for k, date in enumerate(dates) if _is_same(date, reference)), 0)
         if _is_same(dates[same], reference):
             reference = dates[same]
@@ -212,7 +212,7 @@ def _require_names_that_fit(listed: tuple[Listed, ...], reference: str | None) -
 
 
 def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
-    """Raise an error where outputs would be written among the inputs, or what these are made of."""
+    """Raise an error if outputs would be written beside the inputs or their sources."""
     folder = folder.resolve()
     for date in listed:
         if not isinstance(date.raster, Path):
@@ -224,7 +224,7 @@ def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
 def _on_one_map(
     opened: Sequence[Date], failures: Mapping[str, str], reference: str | None
 ) -> tuple[list[Date], dict[str, str]]:
-    """Return the dates that have a place on the reference's map, and why others have none.
+    """Return the dates with a CRS, or without, as the reference, and why others are left out.
 
     Raises
     ------

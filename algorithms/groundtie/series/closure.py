@@ -1,4 +1,4 @@
-"""Triplets of dates: whether the way around three registrations leads back to its start."""
+"""Closures of triplets of dates: whether a loop of three registrations leads back to its start."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from .network import Link, largest_statistic
 
 @dataclass(frozen=True)
 class Closure:
-    """The way around three dates.
+    """A loop of three dates.
 
     Parameters
     ----------
     dates
         The dates, by number.
     error_px
-        By how much it misses its start, root mean square over the frame.
+        Misclosure of the loop, root mean square over the frame.
     expected_px
-        What the covariances of the links expect.
+        Its standard deviation, from the covariances and the scatter of the links.
     statistic
-        The same as a squared normalised length.
+        The misclosure as a squared normalised length.
     is_closed
-        Whether chance explains the error.
+        Whether chance explains the misclosure.
     """
 
     dates: tuple[int, int, int]
@@ -49,7 +49,7 @@ def triplet_closures(
     links
         The registrations, whether the adjustment used them or not.
     scatter_px
-        What each scatters by beside its own covariance.
+        Standard deviation of each link beyond its own covariance.
     """
     by_ends = {frozenset((link.first, link.second)): link for link in links}
     partners: dict[int, set[int]] = {}

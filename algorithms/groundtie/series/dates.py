@@ -1,4 +1,4 @@
-"""The dates of a series, open: their pixels, what sensor they are of, and their footprints."""
+"""The opened dates of a series: their pixels, kinds of sensor, and footprints."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ from ..runs import digest, file_facts, unknown_facts
 from ..vrt_sources import sources_of
 from .inputs import Listed
 
-# Footprints are drawn on images reduced to this, on their longer side.
+# Footprints are drawn on images reduced to this longer side.
 _FOOTPRINT_PX = 256
 
-# What states the place of a shapefile's shapes, and where they are in it.
+# Files of a shapefile that hold the index of its shapes, and their CRS.
 _PARTS_OF_SHAPEFILE = (".shx", ".prj")
 
-# The names of the tags in which GDAL keeps statistics.
+# Prefix of the tags in which GDAL keeps statistics.
 _STATISTICS = "STATISTICS_"
 
-# Domains of tags in which GDAL names the file, as it was named; of documents, as of a VRT's XML.
+# Domains of tags that repeat the file's name as it was given, or hold documents, as a VRT's XML.
 _NAMING_DOMAINS = ("DERIVED_SUBDATASETS", "SUBDATASETS", "xml:")
 
 
@@ -52,15 +52,15 @@ class Date:
     Parameters
     ----------
     listed
-        As it was named.
+        The date as the user named it.
     source
-        The raster, as its file is.
+        The raster as in its file.
     matched
-        What is matched of it: the same, or its grey image in memory.
+        The image that is matched: the raster itself, or its grey image in memory.
     band
-        Which band of the file that is; None: the mean of all.
+        The band of the file that is matched; None: the mean of all.
     drawn
-        It with its mask, on its own pixels; None: it has none, or one that each pair makes.
+        The image with its mask on its own pixels; None: it has no mask, or each pair makes it.
     """
 
     listed: Listed
@@ -71,15 +71,15 @@ class Date:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The date's name."""
         return self.listed.name
 
     def image(self, grid: Grid) -> Image:
-        """Return what is matched, as if its pixels lay on another grid of the same size."""
+        """Return the matched image as if its pixels lay on another grid of the same size."""
         return replace(self.matched, source=replace(self.matched.source, grid=grid))
 
     def masked(self, image: Image) -> Image:
-        """Return its image in a pair with its mask, wherever its pixels were moved."""
+        """Return its image in a pair with its mask, on the image's grid."""
         if self.drawn is None or self.drawn.mask is None:
             return image
         moved = replace(self.drawn.mask, grid=image.source.grid)
@@ -100,12 +100,12 @@ class Date:
 
     @cached_property
     def facts(self) -> tuple[Any, ...]:
-        """What its pixels and their place come from: the files behind it, and what it states."""
+        """Facts that determine its pixels and their place: files behind it, and metadata."""
         return raster_facts(self.listed.raster, self.source)
 
     @cached_property
     def mask_facts(self) -> tuple[Any, ...]:
-        """What its mask and the mask's place come from, as `facts`."""
+        """Facts that determine its mask and the mask's place, as `facts`."""
         mask = self.listed.mask
         if mask is None:
             return (None,)
@@ -117,16 +117,16 @@ class Date:
 
     @cached_property
     def key(self) -> str:
-        """Stands for its files by place, size and time, for its georeferencing, and the mask."""
+        """Digest of its files' place, size and time, of its georeferencing, and of its mask."""
         return digest(self.facts, *self.mask_facts)
 
     def read(self, with_footprint: bool) -> None:
-        """Read what the series asks of the date, so that what fails is the date and not the series.
+        """Read all that the series needs of the date, so that an error fails this date alone.
 
         Parameters
         ----------
         with_footprint
-            Whether that is asked for, too; it takes all pixels.
+            Whether to read the footprint, too, which takes all pixels.
         """
         _ = self.is_radar, self.facts, self.mask_facts, with_footprint and self.rings
 
@@ -158,9 +158,9 @@ def open_dates(
     *,
     with_footprints: bool = True,
 ) -> tuple[list[Date], dict[str, str]]:
-    """Open the rasters of a series; one that cannot be read is left out.
+    """Open the rasters of a series; rasters that cannot be read are left out.
 
-    Returns the dates that could be opened, and what is wrong with the others, by name.
+    Returns the dates that could be opened, and the errors of the others by name.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def open_dates(
     context
         Progress.
     with_footprints
-        Whether footprints will be asked for.
+        Whether footprints will be needed.
     """
     dates: list[Date] = []
     failures: dict[str, str] = {}
@@ -201,7 +201,7 @@ def open_dates(
 
 
 def footprint_shares(polygons: Sequence[Any]) -> dict[frozenset[int], float]:
-    """Return which share of the smaller of two footprints they have in common; 0 is left out.
+    """Return the overlap of footprints as a share of the smaller of two; 0 is left out.
 
     Parameters
     ----------
@@ -217,16 +217,16 @@ def footprint_shares(polygons: Sequence[Any]) -> dict[frozenset[int], float]:
 
 
 def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
-    """Return what a raster's pixels and their place come from: the files behind it, what it states.
+    """Return facts that determine a raster's pixels and their place: its files and its metadata.
 
-    Programs that show a raster write statistics into its `.aux.xml`: of that counts what else the
-    raster states by it. What lies on a server counts by its name and what it states; what lies
-    where no file is found is never the same.
+    Viewers write statistics into a raster's `.aux.xml`: that file counts by the raster's metadata
+    without statistics. A raster on a server counts by its name and metadata. A raster whose files
+    are not found never counts as unchanged.
 
     Parameters
     ----------
     raster, source
-        As it was named, and open.
+        The raster as it was named, and opened.
     """
     behind: list[Path | str] = []
     if isinstance(raster, (str, Path)):
@@ -238,14 +238,14 @@ def raster_facts(raster: Any, source: RasterSource) -> tuple[Any, ...]:
 
 
 def _facts_of(named: Any) -> list[tuple[Any, ...]]:
-    """Return the facts of a raster or a layer as it was named; one in memory has none to keep."""
+    """Return the facts of a raster or a layer as it was named; in memory, they are unknown."""
     if isinstance(named, Path):
         return [file_facts(named)]
     return facts_behind(named) if isinstance(named, str) else [unknown_facts(named.name)]
 
 
 def _stated(source: RasterSource) -> tuple[Any, ...]:
-    """Return what a raster states of its pixels, but for statistics."""
+    """Return a raster's metadata on its pixels, without statistics."""
     bands = [{**vars(band), "tags": _without_statistics(band.tags)} for band in source.bands]
     tags = [
         (domain, _without_statistics(found))
@@ -261,7 +261,7 @@ def _without_statistics(tags: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def parts_of_layer(layer: Any) -> list[Any]:
-    """Return the files of a vector layer or a classifier: a shapefile's are several."""
+    """Return the files of a vector layer or a classifier: a shapefile has several."""
     if not isinstance(layer, Path) or layer.suffix.lower() != ".shp":
         return [layer]
     return [layer, *(layer.with_suffix(ending) for ending in _PARTS_OF_SHAPEFILE)]

@@ -1,4 +1,4 @@
-"""What a registered series leaves in its folder, or a refused one: its report."""
+"""Writing the files of a registered series, or the report on a refused one."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ TABLE_CSV, TABLE_GPKG = "series.csv", "series.gpkg"
 
 @dataclass(frozen=True)
 class SeriesFiles:
-    """What is written.
+    """The files of a series.
 
     Parameters
     ----------
     folder
-        Where registered rasters, tables and `series.json` go.
+        Folder of registered rasters, tables and `series.json`.
     output_grid, resampling
         See `RegisteredOutput`.
     report
-        The HTML page; None: none.
+        Path of the HTML page; None: no page.
     """
 
     folder: Path
@@ -48,9 +48,9 @@ class SeriesFiles:
     report: Path | None
 
     def write(self, series: Series, stored: StoredSeries, context: Context) -> Series:
-        """Write all files, or those of a series without registered dates: the report alone.
+        """Write all files; of a series without registered dates, the report alone.
 
-        What an earlier run left of dates that are not registered any more is removed.
+        Rasters that an earlier run wrote of dates that are no longer registered are removed.
 
         Raises
         ------
@@ -69,14 +69,14 @@ class SeriesFiles:
             write_csv(outputs.stage(self.folder / TABLE_CSV), TABLE_COLUMNS, series.rows())
             _write_layer(outputs.stage(self.folder / TABLE_GPKG), series)
             write_json(outputs.stage(self.folder / SERIES_JSON), series.to_json())
-            # Last: who finds it finds all that it is about.
+            # Last: once the report exists, so do the files that it describes.
             self._write_report(series, outputs)
         self._remove_stale(series, stored)
         forget_unfinished(self.folder)
         return series
 
     def raster_key(self, date: SeriesDate, series: Series) -> str:
-        """Return what stands for all that a date's raster is made of but its transform."""
+        """Return a digest of all that a date's raster is made from, except the transform."""
         assert date.date is not None
         facts = date.date.facts, series.map_grid, self.output_grid, self.resampling
         return digest(facts, __version__)
@@ -84,14 +84,14 @@ class SeriesFiles:
     def _with_rasters(
         self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
     ) -> Series:
-        """Write the rasters that are not there yet, and return what the series has then."""
+        """Write the rasters that do not exist yet, and return the series with all its rasters."""
         dates, written, items = [], {}, []
         for number, one in enumerate(series.dates):
             part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
             try:
                 made = self._with_raster(one, series, stored, outputs, part)
             except NoOverlapError as error:
-                # It lies where the series' map has no pixel of it; the others stand.
+                # The date lies outside of the series' map; the other dates are kept.
                 verdict = replace(one.verdict, reason=f"{one.verdict.reason}; no raster: {error}")
                 one, made = replace(one, verdict=verdict), None
             if made is not None:
@@ -115,7 +115,7 @@ class SeriesFiles:
         outputs: Outputs,
         context: Context,
     ) -> tuple[SeriesDate, StoredDate, Grid] | None:
-        """Return a date, its raster, and the grid of that; None: it is not registered."""
+        """Return a date, its raster, and the raster's grid; None: the date is not registered."""
         if not one.is_registered:
             return None
         assert one.date is not None and one.transform is not None
@@ -123,7 +123,7 @@ class SeriesFiles:
         if before is not None and before.key == key and before.is_untouched(self.folder):
             corners = one.transform.input_grid.outline(2)
             moved = one.transform(before.transform.inverse(corners)) - corners
-            # What untouched pixels may be wrong by, too.
+            # The tolerance that untouched pixels have, too.
             if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
                 has_written(self.folder / before.file)
                 with open_raster(self.folder / before.file) as source:
@@ -137,7 +137,7 @@ class SeriesFiles:
         return one, made, grid
 
     def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
-        """Return the STAC item of a registered date; empty where there can be none."""
+        """Return the STAC item of a registered date; empty if there can be none."""
         assert one.date is not None and one.transform is not None
         covariance = one.verdict.covariance
         assert covariance is not None
@@ -170,21 +170,21 @@ class SeriesFiles:
                     (self.folder / one.file).unlink()
 
     def _remove_tables(self) -> None:
-        """Remove what an earlier run stated of the series, if there was one."""
+        """Remove the tables and `series.json` of an earlier run, if there was one."""
         if (self.folder / SERIES_JSON).exists():
-            # That file last: with it the next run finds what there is to remove.
+            # `series.json` last: if removal is interrupted, the next run goes on by it.
             for name in (TABLE_CSV, TABLE_GPKG, SERIES_JSON):
                 with writing(self.folder / name):
                     (self.folder / name).unlink(missing_ok=True)
 
 
 def registered_name(date: str) -> str:
-    """Return what the registered raster of a date is called."""
+    """Return the file name of a date's registered raster."""
     return f"{date}_registered.cog.tif"
 
 
 def _write_layer(path: Path, series: Series) -> None:
-    """Write the table with a line around each date, where it lies as registered."""
+    """Write the table with the outline of each date as registered."""
     records = [
         {"geometry": _outline(one), "properties": dict(row)}
         for one, row in zip(series.dates, series.rows(), strict=True)

@@ -1,4 +1,4 @@
-"""The frame of a series: where displacements of its dates are measured, and how they compose."""
+"""The frame of a series, in which displacements of its dates are measured and composed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..rasters.grid import FloatArray, Grid, compose, mesh, reproject
 
 Move = Callable[[FloatArray], FloatArray]
 
-# Parameters of a displacement: shift, and rise along both axes, (x, y) each.
+# Parameters of a displacement: the shift, and its change along either axis, (x, y) each.
 PARAMETERS = 6
 
-# Positions a side of the square at which a move is sampled: a plane needs two, bends average out.
+# Samples of a move along each side of the square: a plane needs two; curvature averages out.
 _SAMPLES = 5
 
-# What differs by less differs by rounding alone: corners of grids, or the linear part of a
-# displacement, at the frame's border, from that of a shift.
+# Smaller differences are due to rounding: of grids' corners, or of the linear part of a shift, at
+# the frame's border.
 ROUNDING_PX = 1e-6
 
 
@@ -29,17 +29,17 @@ ROUNDING_PX = 1e-6
 class SeriesFrame:
     """A grid on the map, and a square on it in which positions are within ±1.
 
-    A displacement is a vector of six numbers, in pixels of the grid: a shift at the centre, by how
-    much more it is at the right border, and at the lower one; x before y.
+    A displacement is a vector of six numbers, in pixels of the grid: the shift at the centre, its
+    change to the right border, and its change to the lower border; x before y.
 
     Parameters
     ----------
     grid
         The grid.
     centre_px
-        Centre of the square, pixel position.
+        Pixel position of the square's centre.
     half_px
-        Half its side.
+        Half the square's side.
     """
 
     grid: Grid
@@ -47,7 +47,7 @@ class SeriesFrame:
     half_px: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return the frame as values that JSON can carry."""
+        """Return the frame as JSON values."""
         return {
             **self.grid.to_json(),
             "centre_px": list(self.centre_px),
@@ -67,8 +67,8 @@ class SeriesFrame:
     def around(cls, hub: Grid, dates: Sequence[Grid]) -> SeriesFrame:
         """Return the frame of a series by the grids of its hub and of its dates.
 
-        Its pixels are the hub's, or as large as those of the dates where these are coarser. One
-        date elsewhere does not move it.
+        Its pixel size is the hub's, or the median of the dates' if that is coarser. Its square is
+        that of the median date, so that a single date elsewhere does not move it.
         """
         factor = float(np.median([grid.pixel_size_m for grid in dates])) / hub.pixel_size_m
         grid = hub.scaled(max(factor, 1.0))
@@ -79,7 +79,7 @@ class SeriesFrame:
         return cls(grid, (float(centre[0]), float(centre[1])), half)
 
     def is_of(self, hub: Grid) -> bool:
-        """Return whether it is around a hub of this grid, however large its pixels were made."""
+        """Return whether the frame is one around a hub of this grid, at any pixel size."""
         factor = self.grid.pixel_size[0] / hub.pixel_size[0]
         made = hub.scaled(max(factor, 1.0))
         corners = self.grid.map_to_pixel(made.pixel_to_map(made.outline(1)))
@@ -88,13 +88,13 @@ class SeriesFrame:
 
     @property
     def square(self) -> Frame:
-        """The coordinates of the square on the map."""
+        """The square's coordinates, as a frame on the map."""
         scale = Affine.scale(self.half_px)
         moved = Affine.translation(*self.centre_px)
         return Frame(compose(self.grid.centre_transform, moved, scale))
 
     def displacement_of(self, move: Move) -> FloatArray:
-        """Return the displacement, (6,), that is nearest to a move of map positions."""
+        """Return the least-squares displacement, (6,), of a move of map positions."""
         side = np.linspace(-1, 1, _SAMPLES)
         uv, square = mesh(side, side), self.square
         moved = (square.enter(move(square.leave(uv))) - uv) * self.half_px
@@ -120,7 +120,7 @@ class SeriesFrame:
         return PolynomialModel("affine", self.square, coefficients)
 
     def moved_grid(self, grid: Grid, displacement: FloatArray) -> Grid:
-        """Return a date's grid as moved, at the centre, to where a displacement has its ground."""
+        """Return a date's grid, shifted to undo a displacement at the frame's centre."""
         ground = self.square.leave(np.zeros((1, 2)))
         nominal = self.square.leave(displacement[None, :2] / self.half_px)
         there, here = (reproject(xy, self.grid.crs, grid.crs) for xy in (ground, nominal))
@@ -130,7 +130,7 @@ class SeriesFrame:
 def rms_px(displacement: FloatArray) -> float:
     """Return the root mean square length of a displacement, (6,), over the frame."""
     squared = (displacement.reshape(3, 2) ** 2).sum(axis=1)
-    # u and v are spread evenly over ±1, with a variance of 1/3.
+    # u and v are uniform over ±1, with a variance of 1/3.
     return float(np.sqrt(squared @ [1, 1 / 3, 1 / 3]))
 
 

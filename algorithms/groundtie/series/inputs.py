@@ -1,4 +1,4 @@
-"""What users name as a series: files, folders, patterns, tables and STAC items."""
+"""The inputs of a series: files, folders, patterns, tables and STAC items."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ _COLUMNS = ("file", "name", "time", "mask", "mask_values")
 
 @dataclass(frozen=True)
 class Listed:
-    """One date of a series, as it was named.
+    """One date of a series, as the user named it.
 
     Parameters
     ----------
     name
-        What it is called: the file's stem, the STAC item's id, or the table's name.
+        The file's stem, the STAC item's id, or the name in the table.
     raster
         The file, or GDAL's name of it.
     time
-        When it was taken; None: unknown.
+        Time of acquisition; None: unknown.
     mask
-        What of it takes part; None: all.
+        Mask of the pixels that take part; None: all do.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Listed:
     mask: UserMask | None = None
 
     def anywhere(self) -> Listed:
-        """Return the same for a process in another folder."""
+        """Return the date with absolute paths, for a process in another folder."""
         mask = self.mask
         if mask is not None:
             mask = replace(mask, mask=_absolute(mask.mask))
@@ -64,7 +64,7 @@ def _absolute(path: Path | str) -> Path | str:
 
 
 def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed, ...]:
-    """Return the dates of a series, in the order of their times, else in that of their naming.
+    """Return the dates of a series in the order of their times or, if one is unknown, as named.
 
     Parameters
     ----------
@@ -72,14 +72,14 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
         Files, URLs, folders of rasters, patterns, CSV tables with a column `file` (and `name`,
         `time`, `mask`, `mask_values`), and STAC items or item collections as JSON.
     asset
-        Which asset of STAC items is meant where a name states none (`item.json#asset`); None: the
-        only one that is a raster.
+        The asset of STAC items whose name states none (`item.json#asset`); None: the only asset
+        that is a raster.
 
     Raises
     ------
     ParameterError
-        There is nothing under a name, a table or an item cannot be understood, two dates have one
-        name or one has two, or a name cannot be that of a file.
+        A named input does not exist, a table or an item cannot be understood, two dates have one
+        name, one date has two names, or a name cannot be that of a file.
     """
     found: dict[object, Listed] = {}
     for given in inputs:
@@ -90,7 +90,7 @@ def list_dates(inputs: Sequence[Path | str], asset: str | None) -> tuple[Listed,
                 raise ParameterError(
                     f"{date.raster} is called {other.name} and {date.name}; name it once"
                 )
-    # What lies beside an image as its mask is no date, though its folder names it.
+    # A mask that was found beside an image is no date, though its folder lists it.
     for mask in [date.mask for date in found.values() if date.mask is not None]:
         if mask.origin:
             found.pop(identity(mask.mask), None)
@@ -131,9 +131,9 @@ def _listed(given: Path | str, asset: str | None) -> Iterable[Listed]:
 
 
 def rasters_behind(given: Path) -> Iterator[Path | str]:
-    """Yield what a name becomes dates by: its file, and the files and names that it stands for.
+    """Yield the sources of a name's dates: its file, and the files and names that it stands for.
 
-    What cannot be read stands for nothing: `list_dates` says why.
+    A file that cannot be read stands for nothing: `list_dates` raises the error.
     """
     files = _standing_for(given)
     if files != [given]:
@@ -146,7 +146,7 @@ def rasters_behind(given: Path) -> Iterator[Path | str]:
 
 
 def _named_in(given: Path) -> Iterator[Path | str]:
-    """Yield what a STAC item or a table of dates names."""
+    """Yield the files and names in a STAC item or a table of dates."""
     if is_item(given):
         for item in read_items(given)[0]:
             yield item.place
@@ -159,14 +159,14 @@ def _named_in(given: Path) -> Iterator[Path | str]:
 
 
 def _standing_for(given: Path) -> list[Path]:
-    """Return the files that a folder or a pattern stands for; of any other name itself."""
+    """Return the files that a folder or a pattern stands for; any other name stands for itself."""
     if given.is_dir():
         return sorted(path for path in given.iterdir() if path.suffix.lower() in RASTER_SUFFIXES)
     return sorted(given.parent.glob(given.name)) if _is_pattern(given) else [given]
 
 
 def would_stand_for(given: Path, file: Path) -> bool:
-    """Return whether a folder or a pattern stands for a file, by its whole path, once it exists."""
+    """Return whether a folder or a pattern stands for a file (whole path) once it exists."""
     if given.is_dir():
         return file.parent == given.resolve() and file.suffix.lower() in RASTER_SUFFIXES
     is_there = _is_pattern(given) and file.parent == given.parent.resolve()

@@ -1,4 +1,4 @@
-"""The adjustment of a network of registrations: one displacement a date, by least squares.
+"""Least-squares adjustment of a network of registrations: one displacement for each date.
 
 Sources: [Koch1999] sections 3.2 and 4.2 (adjustment, tests of outliers); [Baarda1968] (data
 snooping); docs/method-series.md has the formulas.
@@ -21,22 +21,22 @@ from ..geometry.judging import SIGNIFICANCE
 from ..rasters.reading import Mask
 from .frame import PARAMETERS, ROUNDING_PX, FloatArray, SeriesFrame, sigma_px
 
-# How far dates may be from each other.
+# Largest offset of dates from each other, in pixels.
 _GOAL_PX = 0.3
 
-# What links scatter by beside their own covariance, per parameter, in pixels: seasons, shadows and
-# tides displace all points alike. It is found from the misclosures, between what the best links
-# leave (suite series) and the goal; a network that needs more is wrong.
+# Standard deviation of links beyond their own covariance, per parameter, in pixels: seasons,
+# shadows and tides displace all points alike. It is estimated from the residuals, between the
+# scatter of the best links (suite series) and the goal; a network that needs more is wrong.
 SCATTER_RANGE_PX = (0.03, _GOAL_PX)
 
-# A link that the others control by less than this is not tested.
+# Links of smaller redundancy are not tested.
 _LEAST_REDUNDANCY = 0.01
 
 # Halvings of the range of the scatter: to less than 0.0001 px.
 _BISECTIONS = 12
 
-# Steps of Gauss and Newton, and the step that is the last: displacements are nearly linear, so that
-# it is one of the first.
+# Most Gauss-Newton steps, and the size of the last step. Displacements are nearly linear, so that
+# few steps are needed.
 _STEPS = 10
 _PRECISION_PX = 1e-9
 
@@ -52,7 +52,7 @@ class Link:
     displacement
         From nominal positions of the first date to those of the second, shape (6,).
     covariance
-        Of it, shape (6, 6), px².
+        Covariance of the displacement, shape (6, 6), px².
     """
 
     first: int
@@ -62,7 +62,7 @@ class Link:
 
 
 def degrees_of_freedom(links: Sequence[Link]) -> int:
-    """Return how many of a displacement's six numbers links can differ in: two, of shifts alone."""
+    """Return the number of parameters in which links can differ: two of shifts alone, else six."""
     is_shift = all(np.abs(link.displacement[2:]).max() < ROUNDING_PX for link in links)
     return 2 if is_shift else PARAMETERS
 
@@ -79,14 +79,14 @@ class Adjustment:
     Parameters
     ----------
     displacements, covariances
-        Of each date against the frame, shapes (n, 6) and (n, 6, 6); NaN for those not reached.
+        Of each date against the frame, shapes (n, 6) and (n, 6, 6); NaN for dates not reached.
     kept
         Which links were used, shape (m,): no outliers, and connected with the hub.
     scatter_px
-        What links scatter by beside their own covariance.
+        Standard deviation of links beyond their own covariance, per parameter.
     confirmed
-        Which dates a second way confirms, shape (n,): they lie in loops, and no single link
-        connects them with the hub.
+        Which dates a second path confirms, shape (n,): they lie in loops, and no single link
+        alone connects them with the hub.
     """
 
     displacements: FloatArray
@@ -102,10 +102,10 @@ class Adjustment:
 
     @property
     def imprecise(self) -> Mask:
-        """Which dates may differ from others of the kind by more than the goal, shape (n,).
+        """Which dates may differ from equally precise ones by more than the goal, shape (n,).
 
-        By chance once in a thousand times: the variance of their difference, of each axis, is that
-        of one date, of both axes.
+        The limit is exceeded by chance once in a thousand times. The variance of the difference on
+        each axis is that of one date on both axes.
         """
         sigmas = np.array([sigma_px(covariance) for covariance in self.covariances])
         return np.asarray(sigmas * np.sqrt(chdtri(2, SIGNIFICANCE)) > _GOAL_PX)
@@ -114,7 +114,7 @@ class Adjustment:
 def adjust(
     frame: SeriesFrame, links: Sequence[Link], count: int, hub: int, *, is_free: bool
 ) -> Adjustment:
-    """Adjust a network; links that contradict the others are taken out, the worst first.
+    """Adjust a network; links that contradict the others are removed, the worst first.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def adjust(
     hub
         The date whose displacement is zero.
     is_free
-        Let the mean displacement of all dates be zero instead.
+        Whether the mean displacement of all dates is zero instead.
     """
     kept = np.array([True] * len(links), bool)
     largest = largest_statistic(links)
@@ -163,7 +163,7 @@ class _Solution:
             displacements = np.array(
                 [frame.of_matrix(frame.matrix(one) @ mean) for one in displacements]
             )
-            # The S-transformation to the datum of the mean.
+            # S-transformation to the datum of zero mean.
             less_mean: FloatArray = np.eye(count)
             less_mean[:, reached] -= 1 / reached.sum()
             change = np.asarray(np.kron(less_mean, np.eye(PARAMETERS)), np.float64)
@@ -190,7 +190,7 @@ class _Network:
         return sorted(ends - {self.hub})
 
     def settled(self) -> _Solution:
-        """Return the solution with the scatter that the median misclosure asks for."""
+        """Return the solution with the scatter at which the median statistic is as expected."""
         low, high = SCATTER_RANGE_PX
         median = float(chdtri(degrees_of_freedom(self.links), 0.5))
 
@@ -210,8 +210,8 @@ class _Network:
     def solve(self, scatter_px: float) -> _Solution:
         """Return the least-squares solution.
 
-        By Gauss and Newton: residuals are exact, by composed transforms; the design, differences
-        of displacements, neglects their products.
+        By the Gauss-Newton method: residuals are exact, from composed transforms; the design
+        matrix, of differences of displacements, neglects their products.
         """
         displacements = np.full((self.count, PARAMETERS), np.nan)
         displacements[self.hub] = 0.0
@@ -254,7 +254,7 @@ class _Network:
         return np.array(found)
 
     def confirmed(self) -> Mask:
-        """Return which dates lie in loops, and no single link alone connects with the hub, (n,)."""
+        """Return which dates lie in loops and reach the hub by more than a single link, (n,)."""
         edges = [(link.first, link.second) for link in self.links]
         inner = []
         for k, (first, second) in enumerate(edges):
@@ -276,7 +276,7 @@ class _Network:
         return self.frame.of_matrix(between) - self.frame.of_matrix(second @ np.linalg.inv(first))
 
     def _design(self, free: list[int]) -> csr_matrix:
-        """Return how links depend on the dates that are free, shape (6 links, 6 dates)."""
+        """Return the design matrix of links by free dates, shape (6 links, 6 dates)."""
         count = len(self.links)
         ends = [end for link in self.links for end in (link.second, link.first)]
         where, signs = (np.repeat(np.arange(count), 2), ends), np.tile([1.0, -1.0], count)
@@ -285,7 +285,7 @@ class _Network:
 
 
 def _reached(links: Sequence[Link], kept: Mask, count: int, hub: int) -> Mask:
-    """Return which links are connected with the hub by those that are kept, shape (m,)."""
+    """Return which links are connected with the hub by kept links, shape (m,)."""
     part = _parts([(link.first, link.second) for link in compress(links, kept)], count)
     return np.array([part[link.first] == part[hub] for link in links], bool)
 

@@ -1,4 +1,4 @@
-"""One registration of the network: two dates, by the pipeline and its rules."""
+"""One registration of the network: two dates, registered by the pipeline and its rules."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from .frame import PARAMETERS, FloatArray, SeriesFrame
 from .inputs import Listed
 from .network import Link
 
-# Two images of one kind of camera show the same gradients: orientation alone finds as many matches
+# Two images of one kind of camera have the same gradients: orientation alone finds as many matches
 # as all measures together, in half of the time (suite series).
 _CAMERAS = replace(COREGISTER, similarity="orientation")
 
-# What another time, or another machine, may not fail for: a full disk, a network, memory.
+# Errors that may not recur at another time or on another machine: a full disk, a network, memory.
 _PASSING = (MemoryLimitError, OutputError, RasterOpenError)
 
 
@@ -65,11 +65,11 @@ class Settings:
     is_placed: bool = False
 
     def of_loops(self) -> Settings:
-        """Return how a pair is registered that places no date, but closes a loop."""
+        """Return the settings of a pair that places no date, but closes a loop."""
         return replace(self, is_placed=True)
 
     def specification(self, first: Date, second: Date) -> Specification:
-        """Return how a pair is registered: the preset of what the two images are."""
+        """Return the specification of a pair, by the kinds of the two images."""
         preset, model = COREGISTER, self.model
         if first.is_radar == second.is_radar:
             preset = SAR_SAR if first.is_radar else _CAMERAS
@@ -88,23 +88,23 @@ class Settings:
 
 @dataclass(frozen=True)
 class PairResult:
-    """What became of the registration of one date to another.
+    """The result of registering one date to another.
 
     Parameters
     ----------
     first, second
         Names of the dates: reference and input.
     key
-        Stands for the files, the settings and the version; empty: it failed for what may pass, so
-        that it is done again in the next run.
+        Digest of the files, the settings and the version; empty: the registration failed for a
+        passing reason and is done again in the next run.
     accepted, rule, reason
         The verdict.
     check_rmse_px
-        Error at check points, in matching pixels; None: none.
+        Error at check points, in matching pixels; None: there is none.
     displacement, covariance
         See `network.Link`; None if it was refused.
     seconds
-        How long it took.
+        Duration.
     is_placed
         Whether the hub had placed both dates (see `Specification`).
     """
@@ -127,7 +127,7 @@ class PairResult:
         return Link(first, second, np.array(self.displacement), np.array(self.covariance))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
+        """Return the result as JSON values."""
         return asdict(self)
 
     @classmethod
@@ -137,7 +137,7 @@ class PairResult:
         Raises
         ------
         KeyError, TypeError, ValueError
-            The values describe none.
+            The values describe no result.
         """
         found = cls(**values)
         if not found.accepted:
@@ -156,7 +156,7 @@ class PairResult:
 
 
 def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) -> str:
-    """Return what stands for a registration: it need not be done again as long as this is same."""
+    """Return the key of a registration, which need not be done again while the key is the same."""
     grid = frame.grid
     place = grid.transform, str(grid.crs), frame.centre_px, frame.half_px
     return digest(first.key, second.key, first.band, settings, place, __version__)
@@ -164,16 +164,16 @@ def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) 
 
 @dataclass(frozen=True)
 class PairTask:
-    """The registration of one date to another, to be done.
+    """A registration of one date to another, to be done.
 
     Parameters
     ----------
     first, second
         Reference and input.
     placed
-        Displacements of both, (6,), as far as they are known: the search starts from there.
+        Displacements of both, (6,), as far as known: the search starts from them.
     settings
-        How.
+        How the pair is registered.
     frame
         The series' frame.
     """
@@ -185,11 +185,11 @@ class PairTask:
     frame: SeriesFrame
 
     def lost(self, error: WorkerLostError) -> PairResult:
-        """Return what became of it if the worker that did it was lost."""
+        """Return the result if the task's worker was lost."""
         return _failed(self.first.name, self.second.name, error.one_line())
 
     def elsewhere(self) -> Callable[[], PairResult]:
-        """Return the task for another process: with files, not pixels."""
+        """Return the task for another process, with files instead of pixels."""
         dates = self.first, self.second
         listed = [date.listed.anywhere() for date in dates]
         key = pair_key(*dates, self.settings, self.frame)
@@ -204,7 +204,7 @@ def _register_files(
     with threads(1) as context, ExitStack() as stack:
         dates, failures = open_dates(listed, band, stack, context, with_footprints=False)
         if failures:
-            # Whoever asked for the pair could open both.
+            # The caller could open both files, so that the error may pass.
             return _failed(listed[0].name, listed[1].name, "; ".join(failures.values()))
         first, second = dates
         found = register_pair(PairTask(first, second, *bare), context)
@@ -212,12 +212,12 @@ def _register_files(
 
 
 def _failed(first: str, second: str, reason: str) -> PairResult:
-    """Return what became of a registration that the next run does again."""
+    """Return the result of a failed registration that the next run does again."""
     return PairResult(first, second, "", False, "", reason)
 
 
 def register_pair(task: PairTask, context: Context) -> PairResult:
-    """Register one date to another; the context gives threads, progress and seed."""
+    """Register one date to another; the context supplies threads, progress and seed."""
     first, second, settings, frame = task.first, task.second, task.settings, task.frame
     started = time.perf_counter()
     key, is_placed = pair_key(first, second, settings, frame), settings.is_placed
@@ -241,7 +241,7 @@ def register_pair(task: PairTask, context: Context) -> PairResult:
     except CancelledError:
         raise
     except GroundTieError as error:
-        # Of this pair alone: the date is named with it, and the others stand.
+        # The error is this pair's alone: it is reported with the date, and other pairs stand.
         failed = replace(refused, key="") if isinstance(error, _PASSING) else refused
         return replace(failed, reason=error.one_line(), seconds=time.perf_counter() - started)
     verdict = found.verdict
@@ -275,7 +275,7 @@ def _measured(
         return lambda xy: grid.pixel_to_map(px_model(grid.map_to_pixel(xy)))
 
     model: Model = estimate.transform.model
-    # Two at least: what was accepted has a finite jackknife.
+    # At least two folds: an accepted estimate has a finite jackknife.
     apart = jackknife_deviations([displacement(fold(one)) for one in estimate.fold_models])
     return displacement(model), apart.T @ apart
 
@@ -283,9 +283,9 @@ def _measured(
 def _nominal(
     model: Any, xy: FloatArray, first: Date, second: Date, grids: list[Grid], frame: SeriesFrame
 ) -> FloatArray:
-    """Return where the second date has ground that the first has at positions of the series' map.
+    """Return the second date's nominal positions of ground at the first date's positions.
 
-    The registration was between grids that had been moved.
+    Both are positions on the series' map. The registration was between moved grids.
     """
     crs, own, other = frame.grid.crs, first.source.grid, second.source.grid
     px = own.map_to_pixel(reproject(xy, crs, own.crs))

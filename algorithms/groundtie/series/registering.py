@@ -1,4 +1,4 @@
-"""Which pairs of a series are registered, in which order, and what comes of their network."""
+"""Registering the pairs of a series: which pairs, and in which order."""
 
 from __future__ import annotations
 
@@ -20,31 +20,30 @@ from .frame import PARAMETERS, FloatArray, SeriesFrame
 from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 
-# Footprints that have less in common are not worth matching: as many chips as a small scene has do
-# not fit in.
+# Smaller overlaps of footprints are not worth matching: they hold fewer chips than a small scene.
 _LEAST_SHARE = 0.1
 
-# A date that the next one in time overlaps less than another by this is matched with that, too.
+# A date is also matched with one that overlaps it by this much more than the next in time does.
 _MUCH_MORE = 0.2
 
-# Any date may be under clouds: as many are tried until one reaches a date that the hub does not, or
-# confirms one in doubt, or is the hub where there is no reference.
+# Most dates that are tried, since any may be cloudy: to reach a date that the hub does not, to
+# confirm a doubtful date, or as the hub without a reference.
 _MOST_TRIES = 3
 
-# How many links each date should have: two make a loop.
+# Number of links that each date should have: two make a loop.
 _WANTED_LINKS = 2
 
 
 @dataclass
 class Matching:
-    """The registrations of a series, done as they are needed.
+    """The registrations of a series, done as needed.
 
     Parameters
     ----------
     dates
         The dates, in the order of their times.
     shares
-        Which share of the smaller footprint two dates have in common; see `footprint_shares`.
+        Overlap of two dates as a share of the smaller footprint; see `footprint_shares`.
     frame, settings
         See `register_pair`.
     known
@@ -52,13 +51,13 @@ class Matching:
     context
         Threads and progress.
     executor
-        Runs pairs, each as a task of files, instead of these threads; None: they do.
+        Runs pairs, each as a task of files, instead of the context's threads; None: the threads do.
     keep
         Receives each registration as soon as it is done.
     results, done, reused
-        The registrations by the numbers of their dates; how many were done, and not done again.
+        Registrations by the numbers of their dates; how many were done, and how many taken over.
     described
-        What chips of the hub are described by, which all of its registrations ask for.
+        Descriptors of the hub's chips, which all of its registrations need.
     """
 
     dates: Sequence[Date]
@@ -91,7 +90,7 @@ class Matching:
         return [result.link(*ends) for ends, result in self.results.items() if result.accepted]
 
     def from_hub(self, hub: int) -> None:
-        """Register all dates to one, reach the others by their neighbours, and close loops."""
+        """Register all dates to a hub, the others to their neighbours, and close loops."""
         self.described = Memo(share_bytes(DESCRIBED_SHARE))
         others = [date for date in range(len(self.dates)) if date != hub]
         self._attempt_all([(hub, date) for date in others], hub)
@@ -101,7 +100,7 @@ class Matching:
         if all(self._is_linked(hub, date) for date in linked):
             self._attempt_all(self._partners(linked), hub)
         else:
-            # Two links may be one way on through a date that others are reached by.
+            # Two links of a date may be a path through it to other dates, instead of a loop.
             self._attempt_all(self._neighbours(sorted(reached)), hub)
         for date in linked:
             for other in self._nearest(date, reached):
@@ -111,7 +110,7 @@ class Matching:
         self._attempt_all(self._further(linked, hub), hub)
 
     def freely(self) -> int:
-        """Register as `from_hub` from the best of several dates, and return it."""
+        """Register as `from_hub` from several dates, and return the best hub."""
         shares = [
             sum(self._share(i, j) for j in range(len(self.dates))) for i in range(len(self.dates))
         ]
@@ -131,7 +130,7 @@ class Matching:
         return max(sorted(self.placed(best)), key=self._degree)
 
     def placed(self, hub: int) -> dict[int, FloatArray]:
-        """Return the displacements of the dates that links reach from a hub, by the first way."""
+        """Return the displacements of the dates that links reach from a hub, by the first path."""
         found: dict[int, FloatArray] = {hub: np.zeros(PARAMETERS)}
         links, frame = self.links, self.frame
         grew = True
@@ -149,7 +148,7 @@ class Matching:
         return found
 
     def _reach(self, others: Sequence[int], hub: int) -> None:
-        """Try to reach dates that the hub does not, from those that are reached, nearest first."""
+        """Try to reach dates that the hub does not, from dates that are reached, nearest first."""
         grew = True
         while grew:
             grew = False
@@ -163,7 +162,7 @@ class Matching:
                         break
 
     def _attempt(self, first: int, second: int, hub: int) -> bool:
-        """Register a pair unless that was done; return whether it is linked."""
+        """Register a pair unless it is done; return whether it is linked."""
         self._attempt_all([(first, second)], hub)
         return self._is_linked(first, second)
 
@@ -175,12 +174,12 @@ class Matching:
         return self.results.get((first, second)) or self.results.get((second, first))
 
     def _attempt_all(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
-        """Register pairs unless that was done, from the places that the dates have now.
+        """Register pairs that are not done, from the present displacements of the dates.
 
-        What becomes of one does not depend on the others: they may run at once.
+        The results do not depend on each other: pairs may run in parallel.
         """
         worth = [ends for ends in pairs if self._share(*ends) >= _LEAST_SHARE]
-        # What is refused where the hub has it is searched for.
+        # A pair that is refused where the hub places its dates is done again, with a search.
         while asked := {frozenset(ends): ends for ends in worth if not self._is_done(ends, hub)}:
             self._register(tuple(asked.values()), hub)
 
@@ -205,7 +204,7 @@ class Matching:
             return
         futures = {ends: self.executor.submit(task.elsewhere()) for ends, task in tasks.items()}
         try:
-            # In the order of the pairs, whichever ends first: the same as here.
+            # In the order of the pairs, whichever ends first, as without an executor.
             for ends, future in futures.items():
                 part = self._next_part(f"registering {len(tasks)} pairs")
                 while wait([future], timeout=POLL_SECONDS).not_done:
@@ -219,10 +218,10 @@ class Matching:
                 future.cancel()
 
     def _settings(self, ends: tuple[int, int], hub: int) -> Settings:
-        """Return how a pair is registered.
+        """Return the settings of a pair.
 
-        Where the hub accepted both dates by all rules, the pair places neither of them: it closes
-        the loop, which is what it is checked by.
+        If both dates were registered to the hub by all rules, the pair places neither of them: it
+        closes a loop, and the loop checks it.
         """
         found = self._known(*ends)
         is_refused = found is not None and not found.accepted
@@ -243,11 +242,11 @@ class Matching:
         self.results.pop(ends[::-1], None)
         self.results[ends] = result
         self.done += 1
-        if result.key:  # none: it failed for what may pass
+        if result.key:  # empty: it failed for a passing reason
             self.keep(result)
 
     def _neighbours(self, chain: Sequence[int]) -> list[tuple[int, int]]:
-        """Return for each date the next in time, and another one if they overlap much more."""
+        """Return pairs of each date with the next in time, and with one of much larger overlap."""
         pairs = []
         for number, date in enumerate(chain[:-1]):
             following = chain[number + 1]
@@ -259,7 +258,7 @@ class Matching:
         return pairs
 
     def _partners(self, dates: Sequence[int]) -> list[tuple[int, int]]:
-        """Return pairs of dates that lack links, each with the best of those that are left."""
+        """Return pairs of dates that lack links, each with the best of the remaining ones."""
         lacking = [date for date in dates if self._degree(date) < _WANTED_LINKS]
         pairs = []
         while lacking:
@@ -275,9 +274,9 @@ class Matching:
         return pairs
 
     def _further(self, dates: Sequence[int], hub: int) -> list[tuple[int, int]]:
-        """Return further pairs of dates that are not well known.
+        """Return further pairs of doubtful dates.
 
-        Their links contradict others, so that further ones show which is wrong, or are imprecise.
+        Their links are imprecise, or contradict others: further links show which are wrong.
         """
         links = self.links
         found = adjust(self.frame, links, len(self.dates), hub, is_free=False)
@@ -294,14 +293,14 @@ class Matching:
         ]
 
     def _nearest(self, date: int, among: Iterable[int]) -> list[int]:
-        """Return dates, those of the best overlap and nearest in time first."""
+        """Return dates in the order of their overlap, then of their distance in time."""
         return sorted(
             (other for other in among if other != date),
             key=lambda other: (-round(self._share(date, other), 1), abs(other - date)),
         )
 
     def _share(self, first: int, second: int) -> float:
-        """Return which share of the smaller footprint two dates have in common."""
+        """Return the overlap of two dates as a share of the smaller footprint."""
         return self.shares.get(frozenset((first, second)), 0.0)
 
     def _degree(self, date: int) -> int:

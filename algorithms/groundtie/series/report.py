@@ -1,4 +1,4 @@
-"""The report on a series: shifts by date, loops, dates that flicker, the worst dates first."""
+"""The report on a series: shifts by date, loops, flickering thumbnails, the worst dates first."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .series import Series, SeriesDate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Longer side of a thumbnail, and how many dates are shown at most: 100 take 3 MB.
+# Longer side of a thumbnail, and the largest number of dates shown: 100 take 3 MB.
 _THUMBNAIL_PX = 360
 _MOST_SHOWN = 100
 
 
 @dataclass(frozen=True)
 class SeriesReport(Page):
-    """What is shown of a series, whatever became of it.
+    """The report on a series, registered or refused.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class SeriesReport(Page):
         return cls(series, title=title, parameters=series.parameters, seconds=series.seconds)
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was measured, by name."""
+        """Return the measured values by name."""
         left_out = {*made(self.parameters, self.seconds), "files"}
         return {k: v for k, v in self.series.summary().items() if k not in left_out}
 
     def values(self) -> dict[str, Any]:
-        """Return what the template shows."""
+        """Return the values that the template shows."""
         series = self.series
         rows = sorted(series.rows(), key=_badness)
         placed = [one for one in series.dates if one.transform is not None]
@@ -66,7 +66,7 @@ class SeriesReport(Page):
         }
 
     def _thumbnails(self, dates: list[SeriesDate]) -> list[dict[str, str]]:
-        """Return each date as it was, and as it was registered, as data URIs."""
+        """Return each date's nominal and registered image as data URIs."""
         grid = pictures.overview_grid(self.series.map_grid, _THUMBNAIL_PX)
         found = []
         for one in dates:
@@ -85,7 +85,7 @@ class SeriesReport(Page):
 
 
 def _badness(row: dict[str, Any]) -> tuple[bool, float, float]:
-    """Return what rows are sorted by: those left out stand first, then those of wide loops."""
+    """Return the sort key of rows: dates that are left out first, then the largest loop errors."""
     stays = row["state"] != "left out"
     return stays, -(row["worst_loop_px"] or 0.0), -(row["sigma_px"] or 0.0)
 
@@ -121,7 +121,7 @@ def shift_figure(series: Series) -> Figure:
 
 
 def closure_figure(series: Series) -> Figure:
-    """Draw the errors of loops against what covariances expect."""
+    """Draw the errors of loops against those expected from covariances."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.8, 3.4), layout="constrained")
@@ -134,7 +134,7 @@ def closure_figure(series: Series) -> Figure:
         if closures:
             places = [one.expected_px for one in closures], [one.error_px for one in closures]
             axes.plot(*places, mark, color=colour, ms=5, label=label)
-    # The axes begin at 0, so that the largest value must lie inside by more than the mark is wide.
+    # The axes begin at 0; the margin keeps the mark of the largest value inside.
     reach = 1.1 * max(*axes.get_xlim(), 1e-6)
     axes.plot([0, reach], [0, reach], color="#bbbbbb", lw=0.8, zorder=0)
     axes.set(xlim=(0, reach), ylim=(0, None), xlabel="expected (px)", ylabel="error of loop (px)")

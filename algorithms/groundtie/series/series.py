@@ -1,4 +1,4 @@
-"""A registered series: its dates, where they lie, and what it leaves in its folder."""
+"""A registered series: its dates, their places, and the files in its folder."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ class SeriesDate:
     Parameters
     ----------
     listed
-        As it was named.
+        The date as the user named it.
     verdict
         Whether it belongs to the series.
     date
-        It, open; None: it could not be opened.
+        The opened date; None: it could not be opened.
     transform
-        From the series' map to its pixels; None: it is left out.
+        From the series' map to the date's pixels; None: the date is left out.
     is_reference
-        Whether it is the reference, which stays as it is.
+        Whether the date is the reference, which stays as it is.
     """
 
     listed: Listed
@@ -71,23 +71,23 @@ class SeriesDate:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The date's name."""
         return self.listed.name
 
     @property
     def is_registered(self) -> bool:
-        """Whether it was registered: it is neither left out, nor the reference, nor alone."""
+        """Whether the date was registered: it is not left out, not the reference, and has links."""
         return self.verdict.accepted and not self.is_reference and self.verdict.evidence.links > 0
 
     def row(self, frame: SeriesFrame, written: StoredDate | None) -> dict[str, Any]:
-        """Return the date's row of the table; shifts are where its ground nominally lies.
+        """Return the date's row of the table; shifts lead to nominal positions of its ground.
 
         Parameters
         ----------
         frame
             The series' frame.
         written
-            Its raster; None: there is none.
+            The date's raster; None: there is none.
         """
         verdict, evidence = self.verdict, self.verdict.evidence
         values: dict[str, Any] = dict.fromkeys(TABLE_COLUMNS)
@@ -130,11 +130,11 @@ class Series:
     dates
         All dates, also those that are left out, in the order of their times.
     frame
-        Where displacements are measured.
+        The frame in which displacements are measured.
     map_grid
-        The grid that registered rasters get: the reference's, or that of the date in the middle.
+        The grid of registered rasters: that of the reference, else of the hub.
     datum
-        What the frame is, in words.
+        What the dates are registered to, in words.
     pairs
         All registrations of two dates, those of earlier runs among them.
     settled
@@ -142,19 +142,19 @@ class Series:
     names
         Names of the dates that could be opened, by their numbers in the network.
     reference_key
-        Stands for the reference's file; None: there is none.
+        Digest of the reference's file; None: there is no reference.
     registered_pairs, reused_pairs
-        How many registrations were done, and how many were taken over from an earlier run.
+        Numbers of registrations that were done, and that were taken over from an earlier run.
     parameters
-        What the tool was called with.
+        All parameters of the tool.
     seconds
-        How long it took.
+        Duration.
     written
         The rasters that were written, by the names of the dates.
     items
         STAC items of these rasters.
     files
-        What was written, by name.
+        The files that were written, by name.
     """
 
     dates: tuple[SeriesDate, ...]
@@ -180,7 +180,7 @@ class Series:
 
     @property
     def left_out(self) -> tuple[SeriesDate, ...]:
-        """The dates that were not."""
+        """The dates that were refused."""
         return tuple(date for date in self.dates if not date.verdict.accepted)
 
     def transforms(self) -> dict[str, Transform]:
@@ -192,9 +192,9 @@ class Series:
         return [date.row(self.frame, self.written.get(date.name)) for date in self.dates]
 
     def beyond_overlap(self, date: SeriesDate, grid: str) -> BeyondOverlap | None:
-        """Return what of a registered date lies where no date is that it was registered with.
+        """Return the part of a registered date outside of all dates that it is linked with.
 
-        None: nothing of it, as on the series' grid.
+        None: there is no such part, as on the series' grid.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class Series:
         return BeyondOverlap.of(grid, date.transform, is_checked)
 
     def beyond_line(self) -> str:
-        """Return what of the dates nothing has checked as a line of text; empty: nothing."""
+        """Return a line of text on the parts of dates that nothing has checked; empty: none."""
         shares = {name: one.outside_of_overlap or 0.0 for name, one in self.written.items()}
         name = max(shares, key=lambda name: shares[name], default="")
         if not shares.get(name):
@@ -237,7 +237,7 @@ class Series:
         return [[self.names[k] for k in ends] for ends in self.settled.rejected]
 
     def loops(self) -> dict[str, Any]:
-        """Return how well triplets of dates close."""
+        """Return the closures of triplets of dates as JSON values."""
         errors = [one.error_px for one in self.settled.closures]
         return {
             "closed": sum(one.is_closed for one in self.settled.closures),
@@ -257,7 +257,7 @@ class Series:
         }
 
     def summary(self) -> dict[str, Any]:
-        """Return the result as values that JSON can carry."""
+        """Return the result as JSON values."""
         values = {
             "verdict": {
                 "accepted": bool(self.registered),
@@ -279,7 +279,7 @@ class Series:
     def to_json(self) -> dict[str, Any]:
         """Return `summary` with all that the next run in the folder needs.
 
-        It is a STAC item collection of the registered rasters, too.
+        The result is also a STAC item collection of the registered rasters.
         """
         values = self.summary()
         for row, date in zip(values["dates"], self.dates, strict=True):

@@ -1,4 +1,4 @@
-"""From registrations to dates: the adjusted network, its loops, and who is left out."""
+"""From registrations to dates: the adjusted network, its loops, and the dates left out."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class DateVerdict(Verdict):
     Parameters
     ----------
     evidence
-        What it rests on.
+        The evidence that the verdict rests on.
     displacement, covariance
         From the series' frame to the date's nominal positions, shapes (6,) and (6, 6); None if the
         date is left out.
     worst_loop_px
-        Largest error of the ways around it; None: there is none.
+        Largest error of the loops through the date that close; None: there is none.
     """
 
     evidence: DateEvidence = field(default_factory=DateEvidence)
@@ -37,7 +37,7 @@ class DateVerdict(Verdict):
 
     @classmethod
     def of(cls, evidence: DateEvidence, confirmed: str = "") -> DateVerdict:
-        """Return what the rules make of a date, without its place."""
+        """Return the verdict of the rules on a date, without its displacement."""
         return cls(**vars(decide(evidence, confirmed)), evidence=evidence)
 
 
@@ -48,11 +48,11 @@ class Settled:
     Parameters
     ----------
     verdicts
-        One for each date.
+        One verdict for each date.
     closures
-        The triplets of dates that stay, worst first.
+        Triplets of dates that stay, without rejected pairs, worst first.
     open_closures
-        Those among all dates that do not lead back to their start.
+        Triplets, among all dates, that do not close.
     adjustment
         The network of the dates that stay.
     rejected
@@ -67,7 +67,7 @@ class Settled:
 
 
 def settle(frame: SeriesFrame, results: Results, count: int, hub: int, *, is_free: bool) -> Settled:
-    """Adjust the network, leave out what the rules refuse, and adjust the rest again.
+    """Adjust the network, leave out dates that the rules refuse, and adjust the rest again.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What earlier runs left of their registrations: nothing that is known is done again.
+"""Registrations that earlier runs have stored, so that they are not done again.
 
-A run that ends has all in `series.json`. One that was cancelled or killed has left a line for each
-registration in `series.unfinished.jsonl`.
+A completed run has stored all of them in `series.json`. A run that was cancelled or killed has left
+a line for each registration in `series.unfinished.jsonl`.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ SERIES_JSON, UNFINISHED = "series.json", "series.unfinished.jsonl"
 
 @dataclass(frozen=True)
 class StoredDate:
-    """A registered raster that a run wrote, and what the next one needs to know of it.
+    """A registered raster that a run wrote, with all that the next run needs to know of it.
 
     Parameters
     ----------
     file
         Its name in the folder.
     key
-        Stands for what it was made of and how, but for the transform.
+        Digest of all that it was made from, except the transform.
     run
         The id of the call that wrote it (see `runs`).
     state
-        Stands for its size and time as it was written (see `state_of`).
+        Digest of its size and time when it was written (see `state_of`).
     transform
-        By which it was made.
+        The transform that it was made with.
     outside_of_overlap
-        Share of it that lies where no other date is; None: nothing, or not known yet.
+        Share of it outside of the overlap with other dates; None: none, or not known yet.
     """
 
     file: str
@@ -57,15 +57,15 @@ class StoredDate:
     outside_of_overlap: float | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return all but the transform as values that JSON can carry."""
+        """Return all but the transform as JSON values."""
         return {name: value for name, value in vars(self).items() if name != "transform"}
 
     def is_untouched(self, folder: Path) -> bool:
-        """Return whether the file is there, as that call left it."""
+        """Return whether the file is there, as that run left it."""
         return self.state is not None and state_of(folder / self.file) == self.state
 
     def is_own(self, folder: Path) -> bool:
-        """Return whether the file is there and of that call, whatever became of it since."""
+        """Return whether the file is there and from that run, even if it was changed since."""
         try:
             with open_raster(folder / self.file) as source:
                 found = source.tags.get("", {}).get(RUN_TAG)
@@ -76,12 +76,12 @@ class StoredDate:
 
 @dataclass(frozen=True)
 class StoredSeries:
-    """What earlier runs left in a folder.
+    """Results that earlier runs left in a folder.
 
     Parameters
     ----------
     frames
-        Their frames, by the keys of the references' files; None: there was none.
+        Their frames, by the keys of the references' files; None: there was no reference.
     pairs
         Their registrations, by their keys.
     dates
@@ -94,7 +94,7 @@ class StoredSeries:
 
 
 def state_of(path: Path) -> str | None:
-    """Return what stands for size and time of a file; None: there is none."""
+    """Return a digest of the size and time of a file; None: there is no file."""
     state = file_state(path)
     # Nanoseconds have more digits than numbers in JSON.
     return None if state is None else digest(state)
@@ -108,9 +108,9 @@ def keep_unfinished(
     Parameters
     ----------
     folder
-        Of the series; it is made for the first registration.
+        The series' folder; it is made for the first registration.
     reference
-        Key of the reference's file; None: there is none.
+        Key of the reference's file; None: there is no reference.
     frame
         The series' frame.
     pair
@@ -127,7 +127,7 @@ def keep_unfinished(
     is_first = not path.exists()
     try:
         with writing(path), path.open("a", encoding="utf-8") as file:
-            # The newline first: the line before may have been cut off with its run.
+            # The newline first: a killed run may have cut off the line before.
             file.write("\n" + json.dumps(values))
     except OutputError:
         if is_first:
@@ -144,12 +144,12 @@ def forget_unfinished(folder: Path) -> None:
 
 
 def read_series(folder: Path) -> StoredSeries:
-    """Return what earlier runs left in a folder; nothing, if there were none.
+    """Return the results that earlier runs left in a folder; empty if there were none.
 
     Raises
     ------
     ParameterError
-        There is a `series.json`, but it is no series'.
+        There is a `series.json`, but it describes no series.
     """
     started = _read_unfinished(folder / UNFINISHED)
     path = folder / SERIES_JSON
@@ -174,7 +174,7 @@ def read_series(folder: Path) -> StoredSeries:
 
 
 def _read_unfinished(path: Path) -> StoredSeries:
-    """Return the registrations of runs that did not end; of lines that are none, nothing."""
+    """Return the registrations of runs that did not end; lines without one are skipped."""
     frames: dict[str | None, SeriesFrame] = {}
     pairs: dict[str, PairResult] = {}
     for values in read_json_lines(path):

@@ -1,8 +1,8 @@
-"""Speckle filters, of intensity images with nodata.
+"""Speckle filters for intensity images with nodata.
 
-Their names, and what they assume of the scene beneath the speckle: `lee` and `kuan` the
-best linear estimate, `enhanced-frost` an exponential correlation, `gamma-map` a gamma distribution,
-`isef` nothing.
+Filters and their assumptions on the scene beneath the speckle: `lee` and `kuan` the best linear
+estimate, `enhanced-frost` an exponential correlation, `gamma-map` a gamma distribution, `isef`
+none.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from .frost import enhanced_frost
 from .isef import decay_for_window, isef
 from .statistics import LocalStatistics, local_statistics
 
-# Side of tiles that stay, with all that filters need, in the processor's cache.
+# Side of tiles that fit, with all intermediates of filters, into the processor's cache.
 _TILE_PX = 256
 
-# Beyond so many windows the weight of an exponential filter is less than a ten thousandth.
+# Distance, in windows, beyond which an exponential filter's weight is less than a ten thousandth.
 _ISEF_REACH = 3
 
 
@@ -34,11 +34,11 @@ class SpeckleFilter:
     name
         One of `FILTERS`.
     window_px
-        Side of the window, odd; that of the mean that smooths as much for "isef".
+        Side of the window, odd; for "isef", that of the mean filter that smooths as much.
     looks
         Equivalent number of looks of the images.
     damping
-        Of "enhanced-frost"; larger values keep more of edges and of speckle.
+        Damping of "enhanced-frost"; larger values keep more of edges and of speckle.
     """
 
     name: str
@@ -48,7 +48,7 @@ class SpeckleFilter:
 
     @property
     def reach_px(self) -> int:
-        """How far off a pixel influences another."""
+        """Largest distance at which a pixel influences another."""
         return _ISEF_REACH * self.window_px if self.name == "isef" else self.window_px // 2
 
     def __call__(self, intensity: FloatImage, valid: Mask) -> FloatImage:
@@ -71,13 +71,13 @@ class SpeckleFilter:
                 tile = _Tile(padded[around], counted[around], reach)
                 out[row : row + _TILE_PX, col : col + _TILE_PX] = FILTERS[self.name](self, tile)
         out[~valid] = 0
-        # Sums that run on from strong scatterers leave a little less than nothing behind.
+        # Running sums leave values slightly below 0 behind strong scatterers.
         return np.maximum(out, np.float32(0), out=out)
 
 
 @dataclass(frozen=True)
 class _Tile:
-    """Pixels with a margin on each side as wide as a filter reaches, and which of them count."""
+    """Pixels with a margin as wide as a filter's reach on each side, and which of them count."""
 
     padded: FloatImage
     counted: Mask
@@ -122,7 +122,7 @@ def _gamma_map(by: SpeckleFilter, tile: _Tile) -> FloatImage:
     root = np.sqrt(centre * centre + 4 * alpha * looks * tile.intensity * mean)
     likeliest = (centre + root) / (2 * alpha)
     smooth = np.where(variation2 > speckle2, likeliest, mean)
-    # Beyond this there is no gamma distribution left: a single strong target.
+    # Beyond this the scene has no gamma distribution: the pixel is a single strong target.
     return np.where(variation2 < 2 * speckle2, smooth, tile.intensity)
 
 
@@ -136,7 +136,7 @@ def _exponential(by: SpeckleFilter, tile: _Tile) -> FloatImage:
 
 
 def _signal_share(local: LocalStatistics, looks: float) -> FloatImage:
-    """Return the share of the local variance that is not speckle's, 0 to 1."""
+    """Return the share of the local variance that is not due to speckle, 0 to 1."""
     share = 1 - np.float32(1 / looks) / np.maximum(local.variation2, np.float32(1e-6))
     return np.maximum(share, 0)
 

@@ -1,9 +1,9 @@
 """The enhanced Frost filter, exact and fast.
 
-A pixel's weight falls exponentially with its distance, by a damping of the centre's own. With the
-city-block distance |x| + |y|, the weighted sum is a polynomial in exp(-damping), whose
-coefficients are the sums over all pixels at each distance. They need no more additions than a
-plain convolution with all dampings alike.
+A pixel's weight falls exponentially with its distance, with a damping that differs for each centre
+pixel. With the city-block distance |x| + |y|, the weighted sum is a polynomial in exp(-damping),
+whose coefficients are the sums over all pixels at each distance. They need no more additions than
+a plain convolution with equal dampings.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def enhanced_frost(
 ) -> FloatImage:
     """Filter speckle by the enhanced Frost filter [Lopes1990a].
 
-    Where the image varies no more than speckle does, the result is the local mean; where it varies
-    more than speckle on any texture, the pixel itself; between the two, the mean with weights
-    exp(-damping (C - Cu) / (Cmax - C) d) at the city-block distance d, where C is the coefficient
-    of variation, Cu² = 1 / looks and Cmax² = 1 + 2 / looks.
+    C is the coefficient of variation, Cu² = 1 / looks and Cmax² = 1 + 2 / looks. Where C is at most
+    Cu, as of speckle alone, the result is the local mean. Where it is at least Cmax, more than
+    speckle on any texture, the result is the pixel itself. Between the two, it is the mean with
+    weights exp(-damping (C - Cu) / (Cmax - C) d) at the city-block distance d.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def enhanced_frost(
     valid
         Which pixels count, same shape.
     statistics
-        Of that window around each of the pixels within, shape (h, …).
+        Statistics of that window around each pixel inside the margin, shape (h, …).
     looks
         Equivalent number of looks.
     damping
@@ -46,7 +46,7 @@ def enhanced_frost(
 
     Returns
     -------
-    Filtered intensity of the pixels within, float32.
+    Filtered intensity of the pixels inside the margin, float32.
     """
     speckle, most = np.float32(np.sqrt(1 / looks)), np.float32(np.sqrt(1 + 2 / looks))
     variation = np.sqrt(statistics.variation2)
@@ -84,6 +84,6 @@ def _polynomial(padded: FloatImage, step: FloatImage, half: int) -> FloatImage:
 
 
 def _pixels_at(half: int) -> NDArray[np.float32]:
-    """Return how many pixels of a window lie at each city-block distance from its centre."""
+    """Return the number of pixels of a window at each city-block distance from its centre."""
     offset = np.abs(np.arange(-half, half + 1))
     return np.bincount(np.add.outer(offset, offset).ravel()).astype(np.float32)

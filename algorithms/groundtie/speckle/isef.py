@@ -11,15 +11,15 @@ from ..rasters.reading import FloatImage
 def isef(image: FloatImage, decay: float) -> FloatImage:
     """Smooth an image by a b^|x| along both axes, with a = (1 - b) / (1 + b).
 
-    [Shen1992]: the best linear filter for edges that
-    are many and near each other.
+    [Shen1992]: the best linear filter for many edges near each other.
 
     Parameters
     ----------
     image
-        Float32, shape (h, w). Beyond its borders, the outermost values go on.
+        Float32, shape (h, w). The outermost values continue beyond its borders.
     decay
-        The b of the formula, 0 to below 1: weight of a pixel over that of its nearer neighbour.
+        The b of the formula, 0 to below 1: ratio of a pixel's weight to that of its nearer
+        neighbour.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def isef_along(image: FloatImage, decay: float, axis: int) -> FloatImage:
 
 
 def _along_rows(image: FloatImage, decay: float) -> FloatImage:
-    """Smooth from row to row: a pass down, a pass up, less the pixel that both count."""
+    """Smooth from row to row: a pass down plus a pass up, less the pixel that both count."""
     gain = 1 - decay
     down, up = image.copy(), image.copy()
     # OpenCV writes into the last argument, here a row; each row rests on the one before.
@@ -52,7 +52,7 @@ def _along_rows(image: FloatImage, decay: float) -> FloatImage:
 
 
 def decay_for_window(window_px: float) -> float:
-    """Return the decay with which noise is smoothed as much as by the mean of a square window.
+    """Return the decay that smooths noise as much as the mean of a square window.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def decay_for_window(window_px: float) -> float:
     from scipy.optimize import brentq  # takes 0.2 s to import; every tool imports the filters
 
     def excess(decay: float) -> float:
-        # Sum of the squared weights of a line, against that of a mean.
+        # Sum of the squared weights of a line, less that of a mean.
         return (1 - decay) * (1 + decay**2) / (1 + decay) ** 3 - 1 / window_px
 
     return float(brentq(excess, 0.0, 1.0))

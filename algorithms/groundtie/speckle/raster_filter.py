@@ -47,7 +47,7 @@ class RasterFilter:
 
     @cached_property
     def like(self) -> RasterSource:
-        """What the result states of itself."""
+        """The source with the result's metadata."""
         source = _as_amplitudes(self.source) if self.source.is_complex else self.source
         # Without speckle, only the tag identifies it as a radar image.
         return with_speckle_filter(source, f"{self.filter.name}, {self.filter.window_px} px")
@@ -83,11 +83,11 @@ class RasterFilter:
                 context.update((i + 1) / tile_count(source.grid))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
-        """Return all bands of a tile, filtered, and which pixels of the first are valid."""
+        """Return all bands of a tile, filtered, and which pixels of the first band are valid."""
         source, around = self.source, tile.widened(self.filter.reach_px)
         inside = tile.slices_in(around)
         values, valid = source.read_bands(around)
-        # Nothing but a mask of all bands marks the pixels without data.
+        # Without nodata and alpha, only a mask that all bands share marks pixels without data.
         if self.nodata is None and source.alpha_band is None and (valid != valid[0]).any():
             raise different_masks(source)
         out = np.empty((source.count, tile.height, tile.width), self.like.dtype)
@@ -110,12 +110,12 @@ class RasterFilter:
         if self.nodata is not None:
             put_nodata(filtered, valid, self.nodata)
             return filtered
-        # Beside a mask an invalid pixel keeps its value, a complex one is 0.
+        # With a mask, an invalid pixel keeps its value; a complex one becomes 0.
         return filtered if source.is_complex else np.where(valid, filtered, values)
 
 
 def require_linear(source: RasterSource) -> None:
-    """Raise `RasterContentError` if stored numbers are not proportional to what they stand for."""
+    """Raise `RasterContentError` if stored numbers are not proportional to the quantity."""
     name = source.path
     if source.colormap is not None:
         raise RasterContentError(
@@ -136,7 +136,7 @@ def require_linear(source: RasterSource) -> None:
 
 
 def _as_amplitudes(source: RasterSource) -> RasterSource:
-    # No number is free for nodata: amplitudes may be 0, and complex numbers may have any parts.
+    # No finite number is free for nodata: amplitudes may be 0, complex numbers may have any parts.
     bands = tuple(
         replace(band, dtype="float32", nodata=None if band.nodata is None else float("nan"))
         for band in source.bands
@@ -147,10 +147,10 @@ def _as_amplitudes(source: RasterSource) -> RasterSource:
 def _power(
     source: RasterSource, pixels: NDArray[Any], valid: Mask, values: str
 ) -> tuple[NDArray[np.float32], float]:
-    """Return the power of pixels, and the unit of their amplitude or intensity that it is in.
+    """Return the power of pixels, and the unit of amplitude or intensity that it is based on.
 
-    Filters compute squares of the power in single precision: in a unit of about the largest pixel
-    none of them overflows. As it is a power of two, results are the same in any.
+    Filters square the power in single precision: in a unit of about the largest pixel, no square
+    overflows. The unit is a power of two, so that results do not depend on it.
     """
     known = np.where(valid, pixels, pixels.dtype.type(0))
     parts = (known.real, known.imag) if source.is_complex else (known,)
@@ -171,7 +171,7 @@ def _power(
 
 
 def looks_of(source: RasterSource, values: str) -> float:
-    """Return the equivalent number of looks in the middle of a raster.
+    """Return the equivalent number of looks at the centre of a raster.
 
     Raises
     ------

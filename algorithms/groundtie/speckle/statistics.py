@@ -10,19 +10,20 @@ import numpy as np
 from ..rasters.patch import window_sums
 from ..rasters.reading import FloatImage, Mask
 
-# Mean power, squared, below which there is nothing: running sums leave this much behind.
+# Squared mean power below which a window counts as empty: running sums leave such residues.
 _NO_POWER = np.float32(1e-30)
 
-# Window in which looks are estimated, and the bins, in octaves of the squared coefficient of
-# variation; homogeneous areas share the fullest. What varies less is drawn or a frame: it has no
-# sensor's noise. No image has less than one look.
+# Window in which looks are estimated, and the histogram's bins, in octaves of the squared
+# coefficient of variation. Homogeneous areas form its first peak, at least _PEAK times as high as
+# the highest. Windows that vary less are of graphics or frames without sensor noise. No image has
+# less than one look.
 LOOKS_WINDOW_PX = 9
 _BIN_OCTAVES = 0.125
 _OCTAVES = (-14.0, 0.375)
 _PEAK = 0.2
 
-# The squared coefficient of variation is at most so many times that of speckle alone in such a
-# window of a homogeneous area.
+# Largest ratio, in such a window of a homogeneous area, of the squared coefficient of variation to
+# that of speckle alone.
 HOMOGENEOUS_EXCESS = 1.3
 
 # Window, and share of the most homogeneous windows, that separate speckled images from others.
@@ -49,7 +50,7 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
     intensity
         Power of the signal, shape (h, w); invalid pixels are 0.
     valid
-        Which pixels count, shape (h, w). What lies beyond the image does not.
+        Which pixels count, shape (h, w). Pixels beyond the image do not.
     window_px
         Side of the window, odd.
 
@@ -59,7 +60,7 @@ def local_statistics(intensity: FloatImage, valid: Mask, window_px: int) -> Loca
         Both 0 where nothing in the window is valid.
     """
     size, outside = (window_px, window_px), cv2.BORDER_CONSTANT
-    # In place as far as may be: masks are made of whole scenes.
+    # In place where possible: masks are made for whole scenes.
     mean: FloatImage = window_sums(intensity, window_px)
     squares: FloatImage = np.asarray(
         cv2.sqrBoxFilter(intensity, cv2.CV_32F, size, normalize=False, borderType=outside),
@@ -87,8 +88,8 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     """Return the equivalent number of looks of an image.
 
     In a homogeneous area, intensity has the squared coefficient of variation 1 / looks. Windows
-    that hold edges or texture vary more, each in its own way: the first of the frequent values is
-    that of the homogeneous ones (after [Foucher2000]).
+    with edges or texture vary more, by different amounts: the first of the frequent values is that
+    of homogeneous windows (after [Foucher2000]).
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     Returns
     -------
     float
-        At least 1, which is returned, too, if no window is valid or none varies.
+        At least 1; also 1 if no window is valid or none varies.
     """
     variation2 = local_statistics(intensity, valid, LOOKS_WINDOW_PX).variation2
     full = window_counts(valid, LOOKS_WINDOW_PX) >= _LEAST_VALID * LOOKS_WINDOW_PX**2
@@ -112,7 +113,7 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
     bins = round((_OCTAVES[1] - _OCTAVES[0]) / _BIN_OCTAVES)
     counts, edges = np.histogram(octave, bins, _OCTAVES)
     counts = np.convolve(counts, np.ones(3), "same")
-    # Texture and edges only add to the variation: of several peaks, the first is speckle's.
+    # Texture and edges only add to the variation: the first of several peaks is that of speckle.
     rising = np.append(-1, counts)[:-1] < counts
     falling = np.append(counts, -1)[1:] <= counts
     peak = int(np.argmax(rising & falling & (counts >= _PEAK * counts.max())))
@@ -123,8 +124,8 @@ def estimate_looks(intensity: FloatImage, valid: Mask) -> float:
 def homogeneous_variation2(intensity: FloatImage, valid: Mask) -> float:
     """Return the squared coefficient of variation in the most homogeneous tenth of all windows.
 
-    Speckle is in every window, while a camera's noise is far below its signal: of a radar and an
-    optical image, the radar's value is larger (measured: on all of 20 real pairs). Windows without
+    Every window has speckle, while a camera's noise is far below its signal: the value of a radar
+    image is larger than that of an optical one (measured: on all of 20 real pairs). Windows without
     any noise, as of frames, are left out.
 
     Parameters
