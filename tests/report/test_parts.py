@@ -22,7 +22,7 @@ TWO_ROWS = survey(35, part=14)
 def test_a_part_is_named_by_place_distance_and_direction() -> None:
     (line,) = parts.lines(TWO_ROWS)
     assert line.startswith("upper: 14 chips lie 10.3 px off (90.0 m east, 50.0 m north)")
-    assert line.endswith("; 0 of them match where the transform has them")
+    assert line.endswith("; 0 of them confirm the transform")
 
 
 def test_numbers_of_a_part() -> None:

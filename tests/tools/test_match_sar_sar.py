@@ -123,7 +123,9 @@ def test_ground_between_forests_is_matched_where_the_whole_is_refused(tmp_path: 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_canopies_are_no_evidence_against_the_ground(tmp_path: Path, seed: int) -> None:
     """Three quarters are forest, which agrees with itself."""
-    with pytest.raises(NotRegisteredError, match="what is neither forest nor settlement") as error:
+    with pytest.raises(
+        NotRegisteredError, match="the ground between forests and settlements"
+    ) as error:
         match_sar_sar(*forest_files(tmp_path, 0.75, seed), tmp_path / "out.tif")
     assert error.value.verdict is not None
     assert error.value.verdict.rule == "ground elsewhere"

@@ -84,5 +84,5 @@ def _in_words(part: Part, survey: Survey) -> str:
     return (
         f"{part.where}: {part.chips} chips lie {part.distance_px:.1f} px off"
         f"{f' ({direction})' if direction else ''}; {confirming(survey, part)} of them "
-        "match where the transform has them"
+        "confirm the transform"
     )

@@ -104,6 +104,6 @@ def refine_rpc(
     The bias of the RPCs is estimated in the image, by least squares weighted with the points'
     covariances, without the blunders among them, and folded into new RPCs. They are refused, and
     nothing is written, if points that took no part are not nearer than before, if these do not
-    agree, or if the points do not hold the model all over the image.
+    agree, or if the points do not determine the model all over the image.
     """
     return refine(parameters, progress)

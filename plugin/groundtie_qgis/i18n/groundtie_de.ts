@@ -1776,7 +1776,7 @@
       <translation>Der Kanal, der zugeordnet wird; ohne Angabe das Mittel aller Kanäle. Ein registriertes Bild hat alle Kanäle.</translation>
     </message>
     <message>
-      <source>The bias of the RPCs is estimated in the image, by least squares weighted with the points' covariances, without the blunders among them, and folded into new RPCs. They are refused, and nothing is written, if points that took no part are not nearer than before, if these do not agree, or if the points do not hold the model all over the image.</source>
+      <source>The bias of the RPCs is estimated in the image, by least squares weighted with the points' covariances, without the blunders among them, and folded into new RPCs. They are refused, and nothing is written, if points that took no part are not nearer than before, if these do not agree, or if the points do not determine the model all over the image.</source>
       <translation>Der systematische Fehler der RPCs wird im Bild geschätzt, nach kleinsten Quadraten, gewichtet mit den Kovarianzen der Punkte, ohne die groben Fehler unter ihnen, und in neue RPCs eingerechnet. Sie werden abgelehnt, und nichts wird geschrieben, wenn Punkte, die nicht teilnahmen, nicht näher liegen als vorher, wenn diese nicht übereinstimmen, oder wenn die Punkte das Modell nicht im ganzen Bild halten.</translation>
     </message>
     <message>

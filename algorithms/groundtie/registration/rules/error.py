@@ -18,7 +18,7 @@ def _uncertain(evidence: EvidenceOfPoints) -> str | None:
     # Negated, so that NaN refuses: it is not known to be small.
     if not points.spread_px <= points.max_error_px:
         spread = f"{points.spread_px:.2f} px over {points.area}"
-        return f"the points do not hold the model: it varies by {spread}"
+        return f"the points do not determine the model: it varies by {spread}"
     # Assessed transforms, whose fit is unknown, have no CE90: NaN passes.
     if not points.accuracy.ce90_px > points.largest_ce90_px:
         return None

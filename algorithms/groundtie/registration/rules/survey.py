@@ -64,10 +64,10 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     if survey is None:
         return None
     if deviations_elsewhere(survey) >= PEAK_DEVIATIONS:
-        return "moved elsewhere as a whole, chips all over match, too"
+        return "chips all over match at a second place, too, if all of them are moved together"
     if evidence.mask.is_ground or not _has_rival(survey):
         return None
-    return "moved elsewhere as a whole, chips all over match about as well"
+    return "chips all over match about as well if all of them are moved together to a second place"
 
 
 def _has_rival(survey: Survey) -> bool:
@@ -89,12 +89,12 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
         return None
     chips = len(survey.centres)
     if has_few_chips(survey, chips):
-        return f"where the transform has them, only {survey.comparable} of {chips} chips overlap"
+        return f"only {survey.comparable} of {chips} chips overlap with the registered input"
     if evidence.mask.is_ground or survey.height >= WEAK_HEIGHT:
         return None
     return (
-        f"only {survey.confirming} of {chips} chips all over match where the transform has "
-        "them, and all of them weakly"
+        f"only {survey.confirming} of {chips} chips all over confirm the transform, "
+        "all of them weakly"
     )
 
 
@@ -116,13 +116,13 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None or not rest.shared.is_evident:
         return None
     if rest.shared.is_drawn:
-        return "both images show the same drawn edges, sharper than ground's or beside one another"
+        return "both images have the same drawn edges, sharper than the ground's or side by side"
     left = rest.survey
     if left is None or _confirms(left, rest):
         return None
     return (
-        "without what both images have the same, pixel by pixel, only "
-        f"{left.confirming} of {len(left.centres)} chips match where the transform has them"
+        "without the content that both images share pixel by pixel, only "
+        f"{left.confirming} of {len(left.centres)} chips confirm the transform"
     )
 
 
@@ -144,7 +144,7 @@ def _unexplained_elsewhere(evidence: RegistrationEvidence) -> str | None:
     is_nearby = is_view and deviations_of_unexplained(surveys, ELSEWHERE_PX) >= PEAK_DEVIATIONS
     if not (is_elsewhere or is_nearby):
         return None
-    return "what the reference does not explain of the input matches elsewhere"
+    return "the part of the input that the reference does not explain matches elsewhere"
 
 
 def deviations_of_rest(rest: Rest | None) -> float:
@@ -164,7 +164,7 @@ def deviations_of_rest(rest: Rest | None) -> float:
 def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if deviations_of_rest(evidence.surveys.rest) < REST_PEAK_DEVIATIONS:
         return None
-    return "without what both images have in common, chips all over match elsewhere"
+    return "without the content that both images share, chips all over match elsewhere"
 
 
 def height_of_else(rest: Rest | None) -> float:
@@ -184,7 +184,7 @@ def _nothing_else(evidence: RegistrationEvidence) -> str | None:
     if evidence.mask.is_ground or height >= LEAST_OF_REST:
         return None
     return (
-        "without what both images have in common, pixel by pixel, chips all over hardly match: "
+        "without the content that both images share pixel by pixel, chips all over hardly match: "
         f"{height:.1f} standard deviations"
     )
 
@@ -195,7 +195,7 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
         return None
     if deviations_elsewhere(ground) < REST_PEAK_DEVIATIONS:
         return None
-    return "what is neither forest nor settlement matches elsewhere"
+    return "the ground between forests and settlements matches elsewhere"
 
 
 SURVEY_RULES: tuple[Rule, ...] = (
