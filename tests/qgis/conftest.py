@@ -223,3 +223,25 @@ def registered_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path
         tie_points=files["TIE_POINTS"],
     )
     return files
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, dict[str, Any]]]:
+    """Tool and values of every run, each of which is refused with a report."""
+    from groundtie_qgis import start_page
+    from groundtie_qgis.run import Outcome
+
+    runs: list[tuple[str, dict[str, Any]]] = []
+
+    class Refused:
+        def __init__(self, *parts: Any) -> None:
+            tool, values, files, _, self._done, _ = parts
+            runs.append((tool, values))
+            self._files = {"REPORT": files["REPORT"]}
+
+        def start(self) -> None:
+            self._files["REPORT"].write_text("refused", encoding="utf-8")
+            self._done(Outcome(False, "nothing in common was found", files=self._files))
+
+    monkeypatch.setattr(start_page, "Run", Refused)
+    return runs
