@@ -23,8 +23,7 @@ from .library import errors, kinds, plugin_metadata, progress
 from .pages import help_url
 from .preselection import NOTHING, preselect
 from .results import forget_layers, load_on_completion, show_report
-from .start_files import file_name
-from .styling import LoadedLayers, icon_of
+from .styling import LoadedLayers, icon_of, origin
 from .tool_loading import LazyTool
 from .translation import tr
 from .unavailable import NamedAlgorithm, UnavailableAlgorithm, broken
@@ -38,8 +37,8 @@ class ToolAlgorithm(NamedAlgorithm):
     def __init__(self, tool: Any) -> None:
         super().__init__(tool)
         self._inputs: dict[str, Any] = {}
-        self._alike: dict[str, Any] = {}
-        self._made_from: dict[str, str] = {}
+        # By output: the renderer of the raster that it is drawn like, and its origin.
+        self._made_of: dict[str, tuple[Any, str]] = {}
         self._about = ""
 
     def createInstance(self) -> QgsProcessingAlgorithm:
@@ -107,13 +106,19 @@ class ToolAlgorithm(NamedAlgorithm):
             self._inputs = self._read(Reader(self, given, context, feedback), written=False)
         except errors.GroundTieError as error:
             raise QgsProcessingException(error.one_line()) from error
+        rasters = [p.name for p in self._tool.parameters if isinstance(p.kind, kinds.RasterIn)]
+        # A tool of one raster makes its outputs from it, even if their values mean something else.
+        only = rasters[0] if len(rasters) == 1 else ""
         for parameter in self._tool.parameters:
             like = getattr(parameter.kind, "like", "")
-            layer = self.parameterAsRasterLayer(parameters, qgis_name(like), context)
-            if like and layer is not None:
-                self._alike[parameter.name] = layer.renderer().clone()
-                self._made_from[parameter.name] = file_name(layer)
-                self._about = layer.name()
+            source = like or only
+            layer = self.parameterAsRasterLayer(parameters, qgis_name(source), context)
+            if not source or layer is None:
+                continue
+            renderer = None
+            if like:
+                renderer, self._about = layer.renderer().clone(), layer.name()
+            self._made_of[parameter.name] = renderer, origin(layer)
         return True
 
     def processAlgorithm(
@@ -177,8 +182,7 @@ class ToolAlgorithm(NamedAlgorithm):
         for parameter in self._tool.parameters:
             path, kind = values[parameter.name], parameter.kind
             if path is not None and isinstance(kind, (kinds.RasterOut, kinds.VectorOut)):
-                alike, source = (d.get(parameter.name) for d in (self._alike, self._made_from))
-                layers.add(str(path), context, alike, source)
+                layers.add(str(path), context, *self._made_of.get(parameter.name, ()))
             for name in getattr(kind, "shows", ()) if path is not None else ():
                 load_on_completion(path / name, context)
                 layers.add(str(path / name), context)

@@ -17,8 +17,7 @@ from qgis.PyQt.QtGui import QColor, QImage
 
 from .dependencies import rasterio_env
 from .run import new_file
-from .start_files import file_name
-from .styling import MADE_FROM
+from .styling import origin
 from .translation import mark
 
 MAP = mark("The map as it is drawn")
@@ -34,23 +33,20 @@ def with_files(reference: Any, input: Any, canvas: Any) -> tuple[Any, dict[str, 
     Parameters
     ----------
     reference
-        A raster layer; None: the map as it is drawn, without the input and layers made from it.
+        A raster layer; None: the map as it is drawn, without the input and layers of the same
+        origin.
     input
         The raster layer to be registered.
     canvas
         The map.
     """
     if reference is None:
-        layers = [layer for layer in canvas.layers() if not _shows(layer, input)]
+        # A raster would be registered to itself if the map showed it, or a relative of it.
+        layers = [layer for layer in canvas.layers() if origin(layer) != origin(input)]
         reference = drawn(layers, input, "map")
     elif reference.providerType() != "gdal":
         reference = drawn([reference], input, reference.name())
     return reference, {"REFERENCE": named(reference), "INPUT": named(input)}
-
-
-def _shows(layer: Any, raster: Any) -> bool:
-    """Return whether a layer shows a raster, which would then be registered to itself."""
-    return file_name(raster) in (file_name(layer), layer.customProperty(MADE_FROM))
 
 
 def named(layer: Any) -> str:

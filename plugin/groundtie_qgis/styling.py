@@ -19,10 +19,11 @@ from qgis.PyQt import sip
 
 from .compat import LINE
 from .library import FOLDER
+from .start_files import file_name
 
 ICON = FOLDER / "icons" / "groundtie.svg"
-# Custom property, saved in projects, of layers made here: the raster file they were made from.
-MADE_FROM = "groundtie/made_from"
+# Custom property, saved in projects, of layers made here: their `origin`.
+_MADE_FROM = "groundtie/made_from"
 TIE_POINTS = FOLDER / "styles" / "tie_points.qml"
 
 
@@ -30,6 +31,11 @@ def icon_of(name: str) -> Path:
     """Return the icon of a tool, or GroundTie's icon if it has none."""
     path = ICON.with_name(f"{name}.svg")
     return path if path.is_file() else ICON
+
+
+def origin(layer: Any) -> str:
+    """Return the raster file that a layer was made from here, in one step or more; else its own."""
+    return str(layer.customProperty(_MADE_FROM) or file_name(layer))
 
 
 class LoadedLayers:
@@ -56,7 +62,7 @@ class LoadedLayers:
         """Schedule the layer of the file `path` for finishing, if the run's context loads it.
 
         Lines are styled as tie points. Rasters take `renderer`, which is that of another raster,
-        and record the file `made_from`.
+        and the `origin` of that raster, `made_from`.
         """
         if context.willLoadLayerOnCompletion(path):
             details = context.layerToLoadOnCompletionDetails(path)
@@ -106,7 +112,7 @@ class LayerFinisher(QgsProcessingLayerPostProcessorInterface):
         if self._renderer is not None and isinstance(layer, QgsRasterLayer):
             draw_alike(layer, self._renderer)
         if self._made_from is not None:
-            layer.setCustomProperty(MADE_FROM, self._made_from)
+            layer.setCustomProperty(_MADE_FROM, self._made_from)
         self._layers.place(layer, self._project)
 
 

@@ -51,8 +51,9 @@ def test_where_no_layer_draws_there_is_no_ground(desktop: Desktop, tmp_path: Pat
 def test_the_map_shows_nothing_of_the_input(
     desktop: Desktop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Neither in another layer, nor registered: it would be registered to itself."""
+    """Neither in another layer, nor registered, nor what it was made from, step by step."""
     from groundtie_qgis import reference_export
+    from groundtie_qgis.run import Run
     from qgis.core import QgsProject
 
     reference, input = pair(tmp_path, desktop)
@@ -69,6 +70,19 @@ def test_the_map_shows_nothing_of_the_input(
     )
     reference_export.with_files(None, input, desktop.canvas)
     assert drawn == [reference]
+    registered = start.outcome.files["OUTPUT"]
+    filtered = tmp_path / "filtered.tif"
+    values = {"INPUT": reference_export.layer_of(registered).id(), "OUTPUT": str(filtered)}
+    done: list[Any] = []
+    Run("filter_speckle", values, {"OUTPUT": filtered}, ("OUTPUT",), done.append, print).start()
+    desktop.wait(lambda: bool(done))
+    assert done[0].succeeded, done[0].reason
+    assert len(QgsProject.instance().mapLayers()) == 5
+    desktop.refresh()
+    for layer in (input, reference_export.layer_of(registered)):
+        drawn.clear()
+        reference_export.with_files(None, layer, desktop.canvas)
+        assert drawn == [reference]
 
 
 ZOOM, TILES = 16, 3
