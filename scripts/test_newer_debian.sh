@@ -66,7 +66,7 @@ command -v apt-get >/dev/null || skip "needs apt-get"
 
 environment=(
     PATH=/usr/bin:/bin HOME=/tmp/home XDG_RUNTIME_DIR=/tmp/home LC_ALL=C.UTF-8
-    QT_QPA_PLATFORM=offscreen PYTHONDONTWRITEBYTECODE=1 GROUNDTIE_REQUIRE_QGIS=1
+    QT_QPA_PLATFORM=offscreen PYTHONPYCACHEPREFIX=/tmp/home/pycache GROUNDTIE_REQUIRE_QGIS=1
     GROUNDTIE_DATA=/data
 )
 [ -z "${CI:-}" ] || environment+=("CI=$CI")

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from groundtie.packages import use_one_thread
+
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("GROUNDTIE_DATA") or ROOT.parent / "shared" / "data").resolve()
 
-# Before numpy is there: the suites run side by side, where threads of BLAS that wait for one
-# another double the time.
-for library in ("OPENBLAS", "OMP"):
-    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+# Before numpy and OpenCV are there: the suites run side by side, on all processors.
+use_one_thread()
 
 # How long an example takes says nothing where other work runs beside it.
 settings.register_profile("untimed", deadline=None)

@@ -1,4 +1,4 @@
-"""What QGIS shows of every tool, read from `qgis_process --json help`, is its declaration."""
+"""What QGIS shows of every tool is its declaration."""
 
 from __future__ import annotations
 
@@ -34,12 +34,56 @@ TYPES = {
 }
 
 
-@pytest.fixture(scope="module", params=load_tools(), ids=lambda tool: tool.name)
-def told(request: pytest.FixtureRequest, qgis_process: Any) -> tuple[Tool, dict[str, Any]]:
-    """A tool and what qgis_process tells of it."""
-    called = qgis_process("--json", "help", f"groundtie:{request.param.name}")
+@pytest.fixture(params=load_tools(), ids=lambda tool: tool.name)
+def told(request: pytest.FixtureRequest, provider: Any) -> tuple[Tool, dict[str, Any]]:
+    """A tool and what QGIS shows of it."""
+    return request.param, shown_of(provider.algorithm(request.param.name))
+
+
+def shown_of(algorithm: Any) -> dict[str, Any]:
+    """Return what QGIS shows of an algorithm, as `qgis_process --json help` does."""
+    from qgis.core import QgsProcessingAlgorithm, QgsProcessingParameterDefinition
+
+    def has(definition: Any, flag: str) -> bool:
+        return bool(definition.flags() & getattr(QgsProcessingParameterDefinition, f"Flag{flag}"))
+
+    def shown(definition: Any) -> dict[str, Any]:
+        numbered = enumerate(definition.options()) if definition.type() == "enum" else ()
+        return {
+            "type": definition.type(),
+            "optional": has(definition, "Optional"),
+            "is_advanced": has(definition, "Advanced"),
+            "default_value": definition.defaultValue(),
+            "description": definition.description(),
+            "help": definition.help(),
+            "raw_definition": definition.toVariantMap(),
+            "available_options": {str(number): option for number, option in numbered},
+        }
+
+    return {
+        "algorithm_details": {
+            "name": algorithm.displayName(),
+            "group": algorithm.group(),
+            "short_description": algorithm.shortDescription(),
+            "can_cancel": bool(algorithm.flags() & QgsProcessingAlgorithm.FlagCanCancel),
+        },
+        "parameters": {d.name(): shown(d) for d in algorithm.parameterDefinitions()},
+        "outputs": {o.name(): {"type": o.type()} for o in algorithm.outputDefinitions()},
+    }
+
+
+def test_qgis_process_shows_the_same(provider: Any, qgis_process: Any) -> None:
+    called = qgis_process("--json", "help", "groundtie:coregister")
     assert (called.returncode, called.stderr) == (0, "")
-    return request.param, json.loads(called.stdout)
+    printed = json.loads(called.stdout)
+    for parameter in printed["parameters"].values():
+        parameter["type"] = parameter["type"]["id"]
+    shown = shown_of(provider.algorithm("coregister"))
+    assert shown["algorithm_details"].items() <= printed["algorithm_details"].items()
+    for part in ("parameters", "outputs"):
+        assert set(shown[part]) == set(printed[part])
+        for name, known in shown[part].items():
+            assert {key: printed[part][name].get(key, {}) for key in known} == known
 
 
 def each(told: tuple[Tool, dict[str, Any]]) -> list[tuple[Parameter, dict[str, Any]]]:
@@ -62,7 +106,7 @@ def test_types(told: tuple[Tool, dict[str, Any]]) -> None:
         # a file that may hold a layer of points is chosen among the layers, too
         layers = isinstance(parameter.kind, FileIn) and ".gpkg" in parameter.kind.suffixes
         expected = "layer" if layers else TYPES[type(parameter.kind).__name__]
-        assert shown["type"]["id"] == expected
+        assert shown["type"] == expected
 
 
 def test_what_is_required(told: tuple[Tool, dict[str, Any]]) -> None:

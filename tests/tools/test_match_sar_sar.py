@@ -223,8 +223,7 @@ def on_many_heights(files: TexturedPair, folder: Path, side_px: int, seed: int) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("side_px", [16, 28])
-@pytest.mark.parametrize("tool", [match_sar_sar, coregister])
+@pytest.mark.parametrize(("tool", "side_px"), [(match_sar_sar, 16), (coregister, 28)])
 def test_a_model_through_many_heights_is_refused(
     files: TexturedPair, tmp_path: Path, tool: Callable[..., object], side_px: int
 ) -> None:

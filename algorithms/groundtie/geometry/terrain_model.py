@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from rasterio.crs import CRS
 
 from ..errors import GroundTieError, TransformFileError
@@ -17,6 +17,8 @@ from ..kinds import plain
 from ..rasters.grid import mesh
 from .models import TERRAIN, FloatArray, Frame, Model, PolynomialModel
 from .terrain import Terrain
+
+IntArray = NDArray[np.intp]
 
 # Heights are found along the line of sight to this precision, in metres: far below the height that
 # displaces by a pixel.
@@ -71,8 +73,9 @@ class TerrainModel(Model):
             return ground
         start, along = uv + self.affine.displacement(uv), self.coefficients[3]
 
-        def risen(rise: FloatArray) -> FloatArray:
-            return ground - terrain.assumed_m(leave(start + rise[:, None] * along))
+        def risen(rise: FloatArray, places: IntArray) -> FloatArray:
+            shown = leave(start[places] + rise[:, None] * along)
+            return ground[places] - terrain.assumed_m(shown)
 
         return _settled(risen, len(uv))
 
@@ -86,11 +89,14 @@ class TerrainModel(Model):
         assumed = terrain.assumed_m(leave(uv)) + self.origin_m
         constant, linear = self.coefficients[0], np.eye(2) + self.coefficients[1:3]
 
-        def seen(rise: FloatArray) -> FloatArray:
-            shown = uv - rise[:, None] * along - constant
+        def seen(rise: FloatArray, places: IntArray | slice = slice(None)) -> FloatArray:
+            shown = uv[places] - rise[:, None] * along - constant
             return leave(np.asarray(np.linalg.solve(linear.T, shown.T).T, np.float64))
 
-        return seen(_settled(lambda rise: terrain.ground_m(seen(rise)) - assumed, len(uv)))
+        def risen(rise: FloatArray, places: IntArray) -> FloatArray:
+            return terrain.ground_m(seen(rise, places)) - assumed[places]
+
+        return seen(_settled(risen, len(uv)))
 
     def on_map(self, affine: Affine) -> TerrainModel:
         """Return this model, which takes pixel positions, as a model of map positions."""
@@ -158,20 +164,26 @@ class TerrainModel(Model):
         return np.column_stack([terrain.ground_m(places), terrain.assumed_m(places)])
 
 
-def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray:
-    """Return the fixed points, shape (size,), of a function of heights, shape (size,).
+def _settled(risen: Callable[[FloatArray, IntArray], FloatArray], size: int) -> FloatArray:
+    """Return the fixed points, shape (size,), of a function of heights at places.
 
-    Secant steps, kept within a bracket once one height is known to be too low and one too high: a
-    continuous function has a fixed point between them, even if it has others elsewhere.
+    `risen` takes heights and the numbers of their places, both (n,). Secant steps, kept within a
+    bracket once one height is known to be too low and one too high: a continuous function has a
+    fixed point between them, even if it has others elsewhere. Few places, those in layover, take
+    many steps: the others are left out as soon as they are found.
     """
-    before = np.zeros(size)
-    rise = risen(before)
+    found, places, before = np.empty(size), np.arange(size), np.zeros(size)
+    found[:] = rise = risen(before, places)
     missed = -rise
     low, high = np.where(missed < 0, 0.0, -np.inf), np.where(missed < 0, np.inf, 0.0)
     for _ in range(_STEPS):
-        still = rise - risen(rise)
-        if not np.nanmax(np.abs(still), initial=0.0) > _PRECISION_M:
+        still = rise - risen(rise, places)
+        found[places[np.isnan(still)]] = np.nan
+        is_open = np.abs(still) > _PRECISION_M
+        if not is_open.any():
             break
+        places, still, missed = places[is_open], still[is_open], missed[is_open]
+        before, rise, low, high = before[is_open], rise[is_open], low[is_open], high[is_open]
         low, high = np.where(still < 0, rise, low), np.where(still < 0, high, rise)
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = (still - missed) / (rise - before)
@@ -183,7 +195,8 @@ def _settled(risen: Callable[[FloatArray], FloatArray], size: int) -> FloatArray
         rise = rise + step
         is_beyond = ((rise <= low) | (rise >= high)) & np.isfinite(high - low)
         rise = np.where(is_beyond, (low + high) / 2, rise)
-    return rise
+        found[places] = rise
+    return found
 
 
 def _found(path: str, folder: Path | None) -> Path:

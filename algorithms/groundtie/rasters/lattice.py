@@ -175,9 +175,13 @@ def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_P
             finer[:, ::2, 1::2] - cols / 2,
             halfway[..., 1::2] - (cols[:, :-1] + cols[:, 1:]) / 4,
         )
-        if max(np.abs(error).max() for error in errors) < tolerance or np.isnan(finer).all():
+        error = max(np.abs(error).max() for error in errors)
+        if error < tolerance or np.isnan(finer).all():
             return Lattice(grid, step, nodes)
         step //= 2
+        # The error of linear interpolation falls with the square of the step, at best.
+        while step > 1 and error / 4 > tolerance:
+            step, error = step // 2, error / 4
     return Lattice(grid, 1, _evaluate(grid, function, 1, 1))
 
 
