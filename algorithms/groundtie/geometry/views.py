@@ -245,6 +245,6 @@ def is_item(path: Path) -> bool:
 
 
 def direction(azimuth_deg: float) -> tuple[float, float]:
-    """Return the step (x, y) of length 1 on the map towards an azimuth."""
+    """Return the step (east, north) of length 1 towards an azimuth."""
     azimuth = math.radians(azimuth_deg)
     return math.sin(azimuth), math.cos(azimuth)
