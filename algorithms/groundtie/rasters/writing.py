@@ -257,5 +257,5 @@ def different_masks(source: RasterSource) -> ParameterError:
     """Return the error that bands lack data at different pixels, which one mask cannot express."""
     return ParameterError(
         f"bands of {source.path} hold no data at different pixels, and a GeoTIFF has one mask for "
-        "all: give them a nodata value, or write them one by one"
+        "all: mark them by a nodata value instead of masks, or write the bands one by one"
     )
