@@ -223,7 +223,7 @@ def _transform_of(array: Any) -> Affine | None:
     stored = located.transform()
     if located.x_dim not in array.coords or located.y_dim not in array.coords:
         # rioxarray returns the identity if there is no transform.
-        return None if stored.is_identity or located.crs is None else stored
+        return None if stored.is_identity else stored
     for dim in (located.x_dim, located.y_dim):
         _require_even(str(dim), np.asarray(array.coords[dim]))
     # The stored transform is exact, but may be that of a larger array of which this is a part:

@@ -248,6 +248,23 @@ def test_the_key_stands_for_metadata_of_missions_beside_an_input(
     assert len(set(found)) == 3
 
 
+@pytest.mark.parametrize("name", ["b.json", "b_extended.json", "../annotation/b.xml", "named.json"])
+def test_the_key_stands_for_the_files_that_state_a_view(
+    folders: tuple[Path, Path], name: str
+) -> None:
+    path = folders[0] / name
+    views = {"views": str(path)} if name == "named.json" else {}
+    row = {"reference": "b.tif", "surface_model": "a.tif", **views}
+    path.parent.mkdir(exist_ok=True)
+    found = []
+    for azimuth in (90, 270):
+        path.write_text(json.dumps({"properties": {"view:azimuth": azimuth}}))
+        (call,) = make_calls(load_tool("mask_surface"), [row], *folders, 1)
+        assert not call.problem
+        found.append(call.key)
+    assert found[0] != found[1]
+
+
 def test_reports_and_tables_of_a_rasters_name_are_no_part_of_it(
     folders: tuple[Path, Path],
 ) -> None:

@@ -34,6 +34,7 @@ from groundtie.simulation.scene import Scene as Country
 from groundtie.simulation.scene import SceneOptions, generate_scene
 
 GRID = utm_grid(200, 180, 1.0)
+CAPE = Grid(Affine(-1, 0, 100, 0, 1, 3_320_000), CRS.from_epsg(2048), 200, 180)
 RADAR, CAMERA = View("radar", 270.0, 40.0), View("camera", 250.0, 18.0, 155.0, 48.0)
 HOUSE = np.s_[80:110, 90:120]
 
@@ -84,8 +85,9 @@ def test_the_rims_of_voids_are_no_walls(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.ground_m[known], 100)
 
 
-def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path) -> None:
-    seen = ground_of(tmp_path, house()).reasons(Window(0, 0, 200, 180))
+@pytest.mark.parametrize("grid", [GRID, CAPE], ids=["north-up", "x west, y south"])
+def test_each_reason_lies_where_geometry_puts_it(tmp_path: Path, grid: Grid) -> None:
+    seen = ground_of(tmp_path, house(), grid).reasons(Window(0, 0, 200, 180))
     layover_px = 12 / math.tan(math.radians(40))
     shadow_px = 12 * math.tan(math.radians(40))
     before, behind = seen[95, :89], seen[95, 121:]

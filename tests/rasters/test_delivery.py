@@ -18,8 +18,8 @@ from groundtie.rasters import tiling
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.delivery import tiles, warp_raster, write_with_geotransform
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
+from groundtie.rasters.nodata import keep_apart
 from groundtie.rasters.reading import open_raster
-from groundtie.rasters.writing import keep_apart
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(90, 70)

@@ -183,6 +183,28 @@ def test_metres_of_any_map_are_those_on_the_ground(text: str, lon: float, latitu
 
 
 @pytest.mark.parametrize(
+    ("text", "lon", "latitude"),
+    [
+        ("EPSG:4326", 10.0, 60.0),
+        ("EPSG:32633", 17.9, 60.0),
+        ("EPSG:2048", 19.5, -30.0),
+        ("EPSG:5513", 15.0, 50.0),
+        ("EPSG:3413", 20.0, 80.0),
+        ("EPSG:3031", 170.0, -75.0),
+        ("EPSG:6933", 10.0, 60.0),
+    ],
+)
+def test_east_and_north_of_any_map(text: str, lon: float, latitude: float) -> None:
+    """By an azimuthal map around the place; survey maps differ from it by their scale."""
+    crs = CRS.from_user_input(text)
+    around = CRS.from_user_input(f"+proj=aeqd +lat_0={latitude} +lon_0={lon} +datum=WGS84")
+    centre, *ends = reproject(np.array([[0.0, 0], [100, 0], [0, 100]]), around, crs)
+    grid = Grid(Affine(1e-5, 0, centre[0], 0, -1e-5, centre[1]), crs, 1, 1)
+    expected = (np.array(ends) - centre) / 100
+    np.testing.assert_allclose(grid.east_north, expected, atol=0.01 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
     ("text", "place"),
     [
         ("EPSG:32633", (5e5, 5e6)),

@@ -31,6 +31,7 @@ from groundtie.rasters.writing import shared_nodata
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(60, 40)
+TURNED = Affine(1.7, 1, 500_000, 1, -1.7, 5_000_000)
 WINDOW = Window(-3, 5, 30, 50)
 
 
@@ -344,13 +345,18 @@ def test_coordinates_are_even_or_no_grid(
 
 @pytest.mark.parametrize(
     ("stored", "transform", "crs"),
-    [(Affine.identity(), None, None), (GRID.transform, GRID.transform, UTM)],
+    [
+        (Affine.identity(), None, None),
+        (GRID.transform, GRID.transform, UTM),
+        (TURNED, TURNED, None),
+    ],
 )
-def test_an_array_with_a_crs_and_no_coordinates(
+def test_an_array_without_coordinates(
     monkeypatch: pytest.MonkeyPatch, stored: Affine, transform: Affine | None, crs: Any
 ) -> None:
     """Also where rioxarray is not installed: it has the identity where no transform is stored."""
-    located = SimpleNamespace(x_dim="x", y_dim="y", crs=UTM, nodata=7, transform=lambda: stored)
+    own = None if stored is TURNED else UTM
+    located = SimpleNamespace(x_dim="x", y_dim="y", crs=own, nodata=7, transform=lambda: stored)
     values = np.zeros((2, 3))
     bare = SimpleNamespace(
         dims=("y", "x"), coords={}, rio=located, transpose=lambda *_: SimpleNamespace(values=values)

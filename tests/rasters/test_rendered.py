@@ -14,14 +14,16 @@ from groundtie.rasters.windows import Window
 
 UTM = CRS.from_epsg(32633)
 PX_M = 10.0
-NORTH_UP = Affine(PX_M, 0, 400_000, 0, -PX_M, 5_000_000)
+NORTH_UP = Affine(PX_M, 0, 500_000, 0, -PX_M, 5_000_000)
 
 
-def plane(east: float, north: float, transform: Affine = NORTH_UP) -> RasterSource:
-    """Ground that rises by so much per metre."""
+def plane(
+    x_rise: float, y_rise: float, transform: Affine = NORTH_UP, crs: CRS = UTM
+) -> RasterSource:
+    """Ground that rises by so much per metre along the axes of the map."""
     rows, cols = np.mgrid[0:20, 0:30] + 0.5
     x, y = transform.a * cols + transform.b * rows, transform.d * cols + transform.e * rows
-    return open_raster(Raster((500 + east * x + north * y).astype(np.float32), transform, UTM))
+    return open_raster(Raster((500 + x_rise * x + y_rise * y).astype(np.float32), transform, crs))
 
 
 def brightness(source: RasterSource, light: Light) -> float:
@@ -62,8 +64,18 @@ def test_ground_that_turns_away_from_the_radar_is_dark_and_what_is_laid_over_fin
     assert 3 < brightness(plane(1.5, 0), light) < 4
 
 
+def test_the_map_need_not_lie_north_up() -> None:
+    """On South African maps, west lies along x and south along y."""
+    place = Affine(PX_M, 0, 0, 0, PX_M, 3_320_000)
+    for rise in ((0.3, 0.0), (0.0, 0.3)):
+        turned = plane(*rise, place, CRS.from_epsg(2048))
+        light = Light(SUN, 150.0)
+        ahead = plane(-rise[0], -rise[1])
+        assert brightness(turned, light) == pytest.approx(brightness(ahead, light), rel=1e-3)
+
+
 def test_pixels_need_not_lie_north_up() -> None:
-    east_down = Affine(0, PX_M, 400_000, -PX_M, 0, 5_000_000)
+    east_down = Affine(0, PX_M, 500_000, -PX_M, 0, 5_000_000)
     for rise in ((0.3, 0.0), (0.0, 0.3)):
         ways = [brightness(plane(*rise, way), Light(SUN, 150.0)) for way in (NORTH_UP, east_down)]
         assert ways[0] == pytest.approx(ways[1], rel=1e-3)

@@ -67,6 +67,16 @@ def test_a_nodata_value_counts_beside_an_alpha_band(
     _assert_near(np.where(known, found, 0), np.where(known, expected, 0), dtype)
 
 
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
+def test_no_mean_is_read_as_nodata(tmp_path: Path, dtype: str) -> None:
+    image, valid = RNG.choice([6, 8], (1, *EVEN)).astype(dtype), RNG.random(EVEN) < 0.7
+    image[0, ~valid] = 7
+    found, shown = _overview(tmp_path, image, valid, nodata=7)
+    expected, known = _means(image, valid[None])
+    np.testing.assert_array_equal(shown, known)
+    assert np.abs(found - expected)[known].max() <= 1.5  # moved by one, and rounded
+
+
 def test_one_pixel_that_is_not_a_number_spoils_no_other(tmp_path: Path) -> None:
     image = RNG.normal(size=(1, *ODD)).astype(np.float32)
     image[0, 600, 700] = np.nan

@@ -119,6 +119,12 @@ def test_metres_in_degrees_are_those_along_each_axis() -> None:
     assert f"7.2 px ({math.hypot(33.4, 44.5):.1f} m) at the centre" in found.text()
 
 
+def test_the_direction_where_x_leads_west_and_y_south() -> None:
+    grid = Grid(Affine(-1, 0, 50, 0, 1, 3_320_000), CRS.from_epsg(2048), 100, 100)
+    found = Correction.of(Transform(shift_model(-3.0, 4.0), grid.crs, grid), grid)
+    assert found.direction == "3.0 m west, 4.0 m north"
+
+
 def test_the_direction_without_georeferencing(ungeoreferenced: ImagePair) -> None:
     transform = transform_of(ungeoreferenced, np.array([7.0, -4.0]))
     assert Correction.of(transform, ungeoreferenced.grid).direction == "7.0 px left, 4.0 px down"

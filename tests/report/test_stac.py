@@ -80,6 +80,14 @@ def test_a_crs_without_a_code_is_wkt(tmp_path: Path, text: str) -> None:
     assert CRS.from_wkt(fields["proj:wkt2"]) == own
 
 
+def test_longitudes_beyond_the_antimeridian_are_those_of_geojson(tmp_path: Path) -> None:
+    beyond = Grid(Affine(0.1, 0, 190, 0, -0.1, 50), CRS.from_epsg(4326), 30, 20)
+    assert item(tmp_path, beyond)["bbox"] == pytest.approx([-170, 48, -167, 50])
+    across = Grid(Affine(0.1, 0, 179, 0, -0.1, 50), CRS.from_epsg(4326), 30, 20)
+    assert item(tmp_path, across) == {}
+    assert item(tmp_path, Grid(Affine(1, 0, 0, 0, -1, 50), CRS.from_epsg(4326), 360, 20)) == {}
+
+
 def test_where_there_can_be_none(tmp_path: Path) -> None:
     assert not item(tmp_path, name="untimed.tif")
     assert not item(tmp_path, replace(GRID, crs=None))

@@ -143,7 +143,7 @@ def test_a_geoid_grid_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyP
     ("crs", "expected"),
     [
         ("EPSG:4326", None),
-        ("EPSG:4979", None),
+        ("EPSG:4979", "ellipsoidal"),
         ("EPSG:4326+5773", "EGM96"),
         ("EPSG:4326+3855", "EGM2008"),
         ("EPSG:4326+5798", "EGM84 height"),
@@ -152,6 +152,6 @@ def test_a_geoid_grid_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyP
         ("EPSG:4326+5783", "DHHN92 height"),
     ],
 )
-def test_a_compound_crs_names_the_datum(tmp_path: Path, crs: str, expected: str | None) -> None:
+def test_a_crs_names_the_datum(tmp_path: Path, crs: str, expected: str | None) -> None:
     with open_raster(write_dem(tmp_path / "dem.tif", crs)) as dem:
         assert declared_datum(dem.grid.crs) == expected

@@ -12,6 +12,8 @@ from typing import Any
 
 from ..call_paths import inputs_of
 from ..declaration import Tool
+from ..geometry.product_views import metadata_beside
+from ..geometry.views import files_named, is_item
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..raster_names import facts_behind, local_files
@@ -89,6 +91,7 @@ def facts_read(
             found += map(_facts, chain([path], inside, _beside(path, listed)))
             found += chain.from_iterable(map(facts_behind, sources_of(path)))
         facts += [(parameter.name, *one) for one in found if one[0] not in own]
+    facts += [("views", *_facts(path)) for path in files_named(values.get("views"))]
     return facts
 
 
@@ -108,6 +111,9 @@ def _beside(path: Path, listed: Listed) -> Iterator[Path]:
             yield path.with_name(name)
     if (mask := mask_beside(path)) is not None:
         yield mask[0]
+    if is_item(item := path.with_suffix(".json")):
+        yield item
+    yield from filter(Path.is_file, metadata_beside(path))
 
 
 def _stems_beside(path: Path) -> list[str]:

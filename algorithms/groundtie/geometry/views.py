@@ -92,7 +92,7 @@ class View:
         if not isinstance(image, (str, Path)):
             return None
         beside = Path(image).with_suffix(".json")
-        if _is_item(beside):
+        if is_item(beside):
             return read_view(beside)
         of_product = map(_product_view, metadata_beside(Path(image)))
         return next((view for view in of_product if view is not None), None)
@@ -125,6 +125,12 @@ def split_views(words: str | None) -> tuple[str | None, str | None]:
     if len(parts) > 2:
         raise ParameterError(f"{words!r} states {len(parts)} views; {_USAGE}")
     return parts[0], parts[1] if len(parts) > 1 else None
+
+
+def files_named(words: str | None) -> list[Path]:
+    """Return the files that words for both images (see `split_views`) name."""
+    parts = [part.strip() for part in (words or "").split(";")]
+    return [Path(part) for part in parts if part.lower().endswith(_SUFFIXES)]
 
 
 def stated_view(given: str) -> View:
@@ -228,8 +234,8 @@ def _view(sensor: str, values: Mapping[str, float], origin: str) -> View:
     )
 
 
-def _is_item(path: Path) -> bool:
-    """Whether a file is a STAC item with a view; reports and transforms are JSON files, too."""
+def is_item(path: Path) -> bool:
+    """Return whether a file is a STAC item with a view; reports are JSON files, too."""
     try:
         found = read_json(path)
     except (OSError, ValueError):
@@ -239,6 +245,6 @@ def _is_item(path: Path) -> bool:
 
 
 def direction(azimuth_deg: float) -> tuple[float, float]:
-    """Return the step (x, y) of length 1 on the map towards an azimuth."""
+    """Return the step (east, north) of length 1 towards an azimuth."""
     azimuth = math.radians(azimuth_deg)
     return math.sin(azimuth), math.cos(azimuth)

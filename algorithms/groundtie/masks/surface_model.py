@@ -198,7 +198,7 @@ def _sight(view: View, grid: Grid) -> LineOfSight:
 
 def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:
     """Return the columns and rows of a grid for a metre of ground towards an azimuth."""
-    units = np.divide(direction(azimuth_deg), grid.metres_per_unit)
+    units = np.matmul(direction(azimuth_deg), grid.east_north)
     linear = np.array([[grid.transform.a, grid.transform.b], [grid.transform.d, grid.transform.e]])
     cols, rows = np.linalg.solve(linear, units).tolist()
     return cols, rows

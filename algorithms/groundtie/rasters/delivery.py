@@ -16,11 +16,12 @@ from ..arrays import Raster
 from ..progress import SILENT, Progress
 from .grid import Grid, PointFunction
 from .lattice import DenseMap, coordinates, lattice
+from .nodata import put_nodata
 from .reading import RasterSource
 from .tiling import band_groups, in_order, tile_count, tiles
 from .warping import read_around, reduction, resample
 from .windows import Mask, Window
-from .writing import chosen_nodata, create_like, different_masks, put_nodata, shared_nodata
+from .writing import chosen_nodata, create_like, different_masks, shared_nodata
 
 # Share of the work that overviews take, after all pixels are written.
 _OVERVIEWS = 0.1

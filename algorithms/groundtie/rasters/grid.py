@@ -166,6 +166,24 @@ class Grid:
         return scale[0] * unit_m, scale[1] * unit_m
 
     @cached_property
+    def east_north(self) -> FloatArray:
+        """Map units of a metre to the east, and to the north, at the grid's centre, shape (2, 2).
+
+        On a map without longitudes, and outside of the projection's domain, they lie along x and y.
+        """
+        unit_m = np.array(self.metres_per_unit)
+        if self.crs is None or self.crs.is_geographic:
+            return np.diag(1 / unit_m)
+        centre = reproject(self.pixel_to_map([self.centre_px]), self.crs, LON_LAT)
+        shrink = np.maximum(np.cos(np.deg2rad(centre[0, 1])), _LEAST_SHRINK)
+        half = np.diag([1 / shrink, 1.0]) * (_STEP_M / METRES_PER_DEGREE / 2)
+        ends = reproject(np.concatenate([centre + half, centre - half]), LON_LAT, self.crs)
+        if not np.isfinite(ends).all():
+            return np.diag(1 / unit_m)
+        metres = (ends[:2] - ends[2:]) * unit_m
+        return np.asarray(metres / np.linalg.norm(metres, axis=1, keepdims=True) / unit_m)
+
+    @cached_property
     def pixel_size_m(self) -> float:
         """Side of a square with a pixel's area, in metres (in pixels without georeferencing)."""
         t = self.transform

@@ -1,4 +1,4 @@
-"""Recognition of nodata: numbers that GDAL equates with the nodata value, and non-measurements."""
+"""Nodata: numbers that GDAL equates with the nodata value, non-measurements, and marking."""
 
 from __future__ import annotations
 
@@ -67,6 +67,29 @@ def are_measured(values: NDArray[Any]) -> NDArray[np.bool_]:
     measured = np.asarray(values > nodata_range(_LOWEST, values.dtype)[1])
     measured &= values < np.inf
     return measured
+
+
+def put_nodata(values: NDArray[Any], valid: NDArray[np.bool_], nodata: float | None) -> None:
+    """Set invalid pixels to the nodata value, or to 0 if there is none, in place."""
+    fill = values.dtype.type(0 if nodata is None else nodata)
+    if nodata is not None:
+        keep_apart(values, fill)
+    values[~valid] = fill
+
+
+def keep_apart(values: NDArray[Any], fill: Any) -> None:
+    """Change values that GDAL would read as nodata by the smallest possible step, in place.
+
+    Complex values are compared by their real parts.
+    """
+    part, nodata = values.real, fill.real
+    if part.dtype.kind != "f":
+        neighbour = nodata + 1 if nodata < np.iinfo(part.dtype).max else nodata - 1
+        part[part == nodata] = neighbour
+    elif np.isfinite(nodata):
+        nearest_0 = min(nodata_range(float(nodata), part.dtype), key=abs)
+        apart = np.nextafter(nearest_0, part.dtype.type(0 if nodata else 1))
+        part[is_nodata(part, float(nodata), part.dtype)] = apart
 
 
 def _last_same(own: Any, end: Any) -> Any:

@@ -126,8 +126,8 @@ def _slopes(heights_m: FloatImage, grid: Grid) -> tuple[FloatImage, FloatImage]:
     """Return slopes per metre to the east and to the north, (h, w), of heights (h + 2, w + 2)."""
     along = (heights_m[1:-1, 2:] - heights_m[1:-1, :-2]) / 2
     down = (heights_m[2:, 1:-1] - heights_m[:-2, 1:-1]) / 2
-    t, (east_m, north_m) = grid.transform, grid.metres_per_unit
+    t = grid.transform
     determinant = t.a * t.e - t.b * t.d
-    x = (along * t.e - down * t.d) / (determinant * east_m)
-    y = (down * t.a - along * t.b) / (determinant * north_m)
-    return x.astype(np.float32), y.astype(np.float32)
+    x, y = (along * t.e - down * t.d) / determinant, (down * t.a - along * t.b) / determinant
+    east, north = (x * step[0] + y * step[1] for step in grid.east_north)
+    return east.astype(np.float32), north.astype(np.float32)

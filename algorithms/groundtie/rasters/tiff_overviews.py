@@ -14,6 +14,7 @@ from scipy import sparse
 from .averaging import overlaps, weighted_sums
 from .handles import FileHandles
 from .metadata import numpy_dtype
+from .nodata import put_nodata
 from .tiff_directories import Image
 from .windows import Mask, Window
 
@@ -99,7 +100,6 @@ class Reduced:
         masks = _masks(dataset, bands, place)
         if masks is None:
             return None
-        fill = 0 if dataset.nodata is None else dataset.nodata
         values = dataset.read(bands, window=place)
         means = np.empty((len(bands), window.height, window.width), values.dtype)
         known = np.ones(means.shape, bool)
@@ -113,9 +113,7 @@ class Reduced:
                 weight[~valid] = 1
             mean = weighted_sums(down, across, band.astype(precision)) / weight
             into[:] = mean if precision == values.dtype else np.floor(mean + 0.5)
-            if dataset.nodata is not None and (into[valid] == fill).any():
-                return None
-            into[~valid] = fill
+            put_nodata(into, valid, dataset.nodata)
         return means, known[0]
 
 

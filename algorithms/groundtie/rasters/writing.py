@@ -10,9 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rasterio.shutil
-from numpy.typing import NDArray
 from rasterio.enums import ColorInterp
 from rasterio.io import MemoryFile
 
@@ -24,14 +22,12 @@ from .grid import Grid
 from .handles import FileHandles
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
-from .nodata import is_nodata, nodata_range
 from .reading import RasterSource
 from .tiff_blocks import PixelType
 from .tiff_directories import BLOCK, base_image
 from .tiff_file import TiledFile, require_space
 from .tiff_overviews import Reduced
 from .tiling import in_order
-from .windows import Mask
 
 # Metadata that belong to the input's file, or locate its pixels, and are not carried over.
 _OWN_DOMAINS = ("IMAGE_STRUCTURE", "DERIVED_SUBDATASETS", "SUBDATASETS", "RPC", "GEOLOCATION")
@@ -261,28 +257,5 @@ def different_masks(source: RasterSource) -> ParameterError:
     """Return the error that bands lack data at different pixels, which one mask cannot express."""
     return ParameterError(
         f"bands of {source.path} hold no data at different pixels, and a GeoTIFF has one mask for "
-        "all: give them a nodata value, or write them one by one"
+        "all: mark them by a nodata value instead of masks, or write the bands one by one"
     )
-
-
-def put_nodata(values: NDArray[Any], valid: Mask, nodata: float | None) -> None:
-    """Set invalid pixels to the nodata value, or to 0 if there is none, in place."""
-    fill = values.dtype.type(0 if nodata is None else nodata)
-    if nodata is not None:
-        keep_apart(values, fill)
-    values[~valid] = fill
-
-
-def keep_apart(values: NDArray[Any], fill: Any) -> None:
-    """Change values that GDAL would read as nodata by the smallest possible step, in place.
-
-    Complex values are compared by their real parts.
-    """
-    part, nodata = values.real, fill.real
-    if part.dtype.kind != "f":
-        neighbour = nodata + 1 if nodata < np.iinfo(part.dtype).max else nodata - 1
-        part[part == nodata] = neighbour
-    elif np.isfinite(nodata):
-        nearest_0 = min(nodata_range(float(nodata), part.dtype), key=abs)
-        apart = np.nextafter(nearest_0, part.dtype.type(0 if nodata else 1))
-        part[is_nodata(part, float(nodata), part.dtype)] = apart

@@ -21,7 +21,7 @@ class Correction:
     centre_px, least_px, most_px
         Lengths at the centre of the matching grid, and over it.
     direction
-        The move at the centre along the axes of the map, in words.
+        The move at the centre, in words.
     rotation_deg
         Rotation of the input, anticlockwise as displayed.
     scale
@@ -89,19 +89,19 @@ def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> 
 
 
 def move_in_words(move: NDArray[np.float64], grid: Grid) -> str:
-    """Return a move in map units along both axes, as "3.0 m east, 1.5 m north".
+    """Return a move in map units as "3.0 m east, 1.5 m north".
 
     Without georeferencing it is in matching pixels, as lengths are.
     """
     # Without georeferencing, map positions are pixels, y downwards.
     on_map = grid.is_georeferenced
     ways = (("west", "east"), ("south", "north")) if on_map else (("left", "right"), ("up", "down"))
-    unit_m = np.array(grid.metres_per_unit)
-    scale, unit = (unit_m, "m") if on_map else (unit_m / grid.pixel_sides_m, "px")
-    lengths = [f"{abs(length):.1f}" for length in move * scale]
+    moved = move @ np.linalg.inv(grid.east_north)
+    moved, unit = (moved, "m") if on_map else (moved / grid.pixel_sides_m, "px")
+    lengths = [f"{abs(length):.1f}" for length in moved]
     parts = [
         f"{text} {unit} {way[int(length > 0)]}"
-        for text, length, way in zip(lengths, move, ways, strict=True)
+        for text, length, way in zip(lengths, moved, ways, strict=True)
         if text != "0.0"
     ]
     return ", ".join(parts)

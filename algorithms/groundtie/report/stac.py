@@ -14,7 +14,7 @@ import numpy as np
 from ..geometry.transform import Transform
 from ..kinds import GEOTIFF
 from ..raster_names import file_name
-from ..rasters.grid import LON_LAT, Grid, epsg_of, reproject
+from ..rasters.grid import LON_LAT, Grid, epsg_of, near_longitude, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES
 from ..registration.verdict import Verdict
@@ -63,8 +63,10 @@ def stac_item(
     if time is None or grid.crs is None:
         return {}
     corners = grid.pixel_to_map(grid.outline(1))
-    places = reproject(corners, grid.crs, LON_LAT)
-    if not np.isfinite(places).all() or np.ptp(places[:, 0]) > _MOST_DEGREES:
+    seen = reproject(corners, grid.crs, LON_LAT)
+    places = near_longitude(seen, 0.0, LON_LAT)
+    longitudes = [seen[:, 0], places[:, 0]]
+    if not np.isfinite(places).all() or np.ptp(longitudes, axis=1).max() > _MOST_DEGREES:
         return {}
     ring = places.tolist()
     return {

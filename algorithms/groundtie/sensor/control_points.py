@@ -24,7 +24,7 @@ from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject
 from .adjustment import Control
 from .control_formats import GDAL_FIRST, HEIGHT, read_others
 from .control_formats import SUFFIXES as OTHER_SUFFIXES
-from .geoids import declared_datum, horizontal
+from .geoids import ELLIPSOIDAL, declared_datum, horizontal
 from .orientation import Orientation, SensorGrid
 from .rpc import RPC
 
@@ -185,7 +185,7 @@ def read_control_points(
     crs = stored.crs or orientation.crs
     height = stored.more[HEIGHT]
     datum = declared_datum(crs)
-    if datum is not None and np.isfinite(height).any():
+    if datum not in (None, ELLIPSOIDAL) and np.isfinite(height).any():
         raise TransformFileError(
             f"{path} states heights above {datum}, but those of control points count from the "
             "ellipsoid: convert them, or leave the heights out to take the terrain model's"

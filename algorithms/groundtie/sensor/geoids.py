@@ -22,18 +22,23 @@ _GRIDS = {
 
 # The name of the vertical part of a compound CRS, in WKT 1 or 2.
 _VERTICAL = re.compile(r'\bVERT(?:_CS|CRS)\["([^"]*)"', re.IGNORECASE)
-_NO_DATUM = re.compile(r"^$|unknown|unnamed|ellipsoid", re.IGNORECASE)
+_NO_DATUM = re.compile(r"^$|unknown|unnamed", re.IGNORECASE)
+# The vertical part of a CRS, or the third axis of another one, that counts from the ellipsoid.
+_ELLIPSOID = re.compile(r'\b(VERT_CS|VERTCRS|AXIS)\["[^"]*ellipsoid', re.IGNORECASE)
 _COMPOUND = re.compile(r'COMPD_CS\["[^"]*",(.*),VERT_CS\[', re.DOTALL)
 
 DATUMS = (ELLIPSOIDAL, *_GRIDS)
 
 
 def declared_datum(crs: CRS | None) -> str | None:
-    """Return the vertical datum of a compound CRS: a name of `DATUMS`, or the CRS's own name.
+    """Return the vertical datum of a CRS: a name of `DATUMS`, or the CRS's own name.
 
-    None: the CRS names no datum, or the ellipsoid.
+    None: the CRS names no datum.
     """
-    found = None if crs is None else _VERTICAL.search(crs.to_wkt())
+    wkt = "" if crs is None else crs.to_wkt()
+    if _ELLIPSOID.search(wkt):
+        return ELLIPSOIDAL
+    found = _VERTICAL.search(wkt)
     if found is None or _NO_DATUM.search(found[1]):
         return None
     text = found[1].upper().replace(" ", "")

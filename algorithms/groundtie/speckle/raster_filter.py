@@ -15,11 +15,12 @@ from ..context import Context
 from ..errors import RasterContentError
 from ..rasters.hidden_files import final_name
 from ..rasters.metadata import rounded, working_dtype
+from ..rasters.nodata import put_nodata
 from ..rasters.patch import middle_window
 from ..rasters.radar_tags import with_speckle_filter
 from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiling import in_order, require_workable, tile_count, tiles
-from ..rasters.writing import chosen_nodata, create_like, different_masks, put_nodata
+from ..rasters.writing import chosen_nodata, create_like, different_masks
 from .filters import SpeckleFilter
 from .statistics import estimate_looks
 
