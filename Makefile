@@ -40,7 +40,8 @@ test: ## everything; quick tests and QGIS with Debian's packages
 	$(MAKE) --jobs=2 --output-sync=target test-newest test-debian test-qgis
 
 test-newest: lint
-	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile --ignore=tests/qgis
+	env -u GROUNDTIE_REQUIRE_QGIS $(PY) -m pytest -n 2 --dist=loadfile --no-loadscope-reorder \
+		--ignore=tests/qgis
 
 # The quick tests meet every module, and test-qgis runs the tools with the same packages. What looks
 # at the repository or at the benchmarks is the same with any. `make test-debian QUICK=` runs all.

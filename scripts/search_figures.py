@@ -33,12 +33,12 @@ from scripts.drawing import (
 def similarity(scenes: Scenes) -> Figure:
     """Similarity surfaces of one chip by four measures."""
     pair, surface = scenes.rural(), scenes.folder / "surface.tif"
-    true_px = _true_shift_px(pair, 412130.5, 5333629.5)
+    true_px = _true_shift_px(pair, 500130.5, 5333629.5)
     figure, axes = canvas(8, 2.35, 4)
     for each, name in zip(axes, ("nmi", "orientation", "edge-strength", "fused"), strict=True):
         result = groundtie.similarity_surface(
             pair / "reference.tif", pair / "input.tif", surface, similarity=name,
-            centre_x=412130.5, centre_y=5333629.5,
+            centre_x=500130.5, centre_y=5333629.5,
         )  # fmt: skip
         with rasterio.open(surface) as source:
             values = source.read(2)

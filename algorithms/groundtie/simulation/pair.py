@@ -35,8 +35,9 @@ from .scene import Scene, SceneOptions, generate_scenes
 OPTICAL, SAR = "optical", "sar"
 INPUTS = (OPTICAL, SAR)
 
+# On the central meridian, where azimuths count from the map's north as from true north.
 CRS_EPSG = 32633
-CORNER_M = (412_000.0, 5_334_000.0)
+CORNER_M = (500_000.0, 5_334_000.0)
 
 _MARGIN_STEP_PX = 64
 
