@@ -58,6 +58,8 @@ class RepairPage(QWidget):
         self._canvas, self._overlay = canvas, overlay
         self._changed, self._written = changed, written
         self.review: Any = None
+        # States of the points before each edit, the newest last.
+        self._past: list[Any] = []
         self.fits: dict[str, Any] = {}
         self._reference: Any = None
         self._input: Any = None
@@ -88,6 +90,8 @@ class RepairPage(QWidget):
         # The buttons are released when another map tool, of this page or of QGIS, is chosen.
         self._drag.setButton(self.drag)
         self._click.setButton(self.add)
+        self.undo = QPushButton(tr("Undo"))
+        self.undo.clicked.connect(lambda *_: self._undo())
         self.match = QCheckBox(tr("refine clicks by similarity"))
         self.match.setChecked(True)
         self.write = QPushButton(tr("Write image"))
@@ -97,6 +101,7 @@ class RepairPage(QWidget):
         tools = QHBoxLayout()
         tools.addWidget(self.drag)
         tools.addWidget(self.add)
+        tools.addWidget(self.undo)
         layout.addLayout(tools)
         for widget in (self.match, self.view, self.text, self.write):
             layout.addWidget(widget)
@@ -105,6 +110,7 @@ class RepairPage(QWidget):
     def _enable(self) -> None:
         for widget in (self.drag, self.add, self.match, self.model):
             widget.setEnabled(self.review is not None)
+        self.undo.setEnabled(bool(self._past))
         self.write.setEnabled(bool(self.fits) and self.writer.run is None)
 
     def open_sensor(self, reference: Any, ortho: Any, image: SensorImage, outcome: Outcome) -> None:
@@ -138,7 +144,7 @@ class RepairPage(QWidget):
     def close_points(self) -> None:
         """Discard the points."""
         self.stop()
-        self.review, self.fits = None, {}
+        self.review, self.fits, self._past = None, {}, []
         self._reference = self._input = self._sensor = None
         self.model.clear()
         self.table.show_review(None, np.zeros(0))
@@ -175,7 +181,15 @@ class RepairPage(QWidget):
         return str(self.model.currentData() or "")
 
     def change(self, review: Any, kind: str | None = None) -> None:
-        """Show a new state of the points and refit them."""
+        """Show edited points, or other ones with a `kind` of model, and refit them."""
+        self._past = [] if kind else [*self._past, self.review]
+        self._refit(review, kind)
+
+    def _undo(self) -> None:
+        *self._past, before = self._past
+        self._refit(before)
+
+    def _refit(self, review: Any, kind: str | None = None) -> None:
         wanted = kind or self.kind() or "affine"
         self.review = review
         self.fits = review.fits() if self._sensor is None else review.fits([*BIASES])

@@ -72,6 +72,26 @@ def test_repair_moves_switches_and_writes(desktop: Desktop, dock: Any, tmp_path:
     desktop.picture("6_written")
 
 
+def test_edits_are_undone_one_by_one(dock: Any) -> None:
+    repair = dock.repair
+    states = [repair.review]
+    assert not repair.undo.isEnabled()
+    repair._switch(0, False)
+    states.append(repair.review)
+    repair.match.setChecked(False)
+    place = repair.review.points.reference_xy[0] + 30.0
+    repair.add_point(tuple(place), repair.review.input_px(place))
+    assert len(repair.review.points) == len(states[0].points) + 1
+    for state in reversed(states):
+        repair.undo.click()
+        assert repair.review is state
+        assert repair.table.rowCount() == len(repair.points.rows) == len(state.points)
+    assert not repair.undo.isEnabled()
+    repair._switch(0, False)
+    repair.close_points()
+    assert not repair.undo.isEnabled()
+
+
 def test_an_image_is_written_once_while_points_change(desktop: Desktop, dock: Any) -> None:
     repair = dock.repair
     repair.write.click()

@@ -102,6 +102,7 @@ def orthorectify(
 
 def _crs(text: str | None) -> CRS | None:
     try:
-        return None if text is None else require_map(CRS.from_user_input(text))
+        crs = None if text is None else CRS.from_user_input(text)
     except (CRSError, ValueError) as error:
         raise ParameterError(f"crs is not understood: {text}") from error
+    return require_map(crs)

@@ -1980,6 +1980,10 @@
       <translation>Konsistenz hin und zurück (px)</translation>
     </message>
     <message>
+      <source>Undo</source>
+      <translation>Rückgängig</translation>
+    </message>
+    <message>
       <source>Unit of the pixels. Decibels must be made linear before.</source>
       <translation>Einheit der Pixel. Dezibel müssen vorher linear gemacht werden.</translation>
     </message>
