@@ -30,6 +30,18 @@ def test_errors_in_all_directions_are_no_heights() -> None:
     assert scatter_px(scatter(100, 1.5)) == 0
 
 
+def test_chance_is_taken_for_heights_at_the_usual_level() -> None:
+    """By either of two tests at 5 %: in no more than 10 % of all cases, and no less than 5 %."""
+    draws = np.random.default_rng(3).normal(0, 1.5, (2000, 30, 2))
+    assert 0.05 < np.mean([scatter_px(residuals) > 0 for residuals in draws]) < 0.1
+
+
+def test_a_few_wrong_matches_hide_no_line() -> None:
+    """Not normally distributed: ten of 60 match anywhere within 6 px."""
+    wrong = np.random.default_rng(1).uniform(-6, 6, (10, 2))
+    assert scatter_px(np.concatenate([displaced(50, -2.5, 2.5), wrong])) > 0.5
+
+
 def test_what_is_no_inlier_counts_for_nothing() -> None:
     residuals = np.concatenate([scatter(100, 0.5), displaced(30, 4, 10)])
     assert scatter_px(residuals) > 1

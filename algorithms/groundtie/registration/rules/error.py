@@ -41,7 +41,7 @@ ERROR_RULES: tuple[Rule, ...] = (
         "the model varies by more than the largest error if blocks of points are left out in turn, "
         "or its CE90, which includes what heights may displace all points by, is above the CE90 "
         "that belongs to the largest error",
-        "jackknife, [Efron1993]; [Mauchly1940]; the user's largest error",
+        "jackknife, [Efron1993]; [Mauchly1940]; [Mardia2000]; the user's largest error",
         "give a simpler model, or a larger part of the scene; in a town, give a mask of the ground",
         _uncertain,
     ),
