@@ -49,9 +49,9 @@ def scatter_along_line(residuals_px: FloatArray, weights: FloatArray) -> FloatAr
     """Return the scatter of residuals along a line in excess of the scatter across it.
 
     n pairs of normal variates have a sphericity of w or less with probability w^((n − 2) / 2)
-    [Mauchly1940]; a few wrong matches hide the line from it. The mean of n unit vectors at twice the
-    angles of the residuals is r or longer with probability exp(−n r²) [Mardia2000], however far the
-    matches lie.
+    [Mauchly1940]; a few wrong matches hide the line from it. The mean of n unit vectors at twice
+    the angles of the residuals is r or longer with probability exp(−n r²) [Mardia2000], however far
+    the matches lie.
 
     Parameters
     ----------
