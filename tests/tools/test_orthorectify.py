@@ -16,13 +16,7 @@ from rasterio.warp import reproject as gdal_reproject
 from rpc_models import camera_rpc, to_rasterio, write_dem, write_positions
 
 import groundtie
-from groundtie.errors import (
-    GeoreferencingError,
-    GroundTieError,
-    NoOverlapError,
-    OutputError,
-    ParameterError,
-)
+from groundtie.errors import GroundTieError, NoOverlapError, OutputError, ParameterError
 from groundtie.rasters.grid import LON_LAT, Grid, apply_affine, reproject
 from groundtie.sensor.rpc_files import write_rpc
 
@@ -236,12 +230,6 @@ def test_parameters_that_do_not_go_together(
         changes = changes | {"reference": write_dem(files["dem"].with_name("other.tif"))}
     with pytest.raises(ParameterError, match=reason):
         groundtie.orthorectify(**(files | changes))  # type: ignore[arg-type]
-    assert not files["output"].exists()
-
-
-def test_the_crs_is_that_of_a_map(files: dict[str, Path]) -> None:
-    with pytest.raises(GeoreferencingError, match="neither projected nor geographic"):
-        groundtie.orthorectify(**files, dem_datum="ellipsoidal", crs="EPSG:4978")
     assert not files["output"].exists()
 
 

@@ -102,7 +102,6 @@ def orthorectify(
 
 def _crs(text: str | None) -> CRS | None:
     try:
-        crs = None if text is None else CRS.from_user_input(text)
+        return None if text is None else require_map(CRS.from_user_input(text))
     except (CRSError, ValueError) as error:
         raise ParameterError(f"crs is not understood: {text}") from error
-    return require_map(crs)
