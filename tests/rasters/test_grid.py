@@ -204,6 +204,12 @@ def test_east_and_north_of_any_map(text: str, lon: float, latitude: float) -> No
     np.testing.assert_allclose(grid.east_north, expected, atol=0.01 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("text", ["EPSG:32633", "EPSG:3035"])
+def test_outside_of_a_projections_domain_east_and_north_lie_along_its_axes(text: str) -> None:
+    grid = Grid(Affine(1, 0, 9e9, 0, -1, 9e9), CRS.from_user_input(text), 1, 1)
+    np.testing.assert_array_equal(grid.east_north, np.eye(2))
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [

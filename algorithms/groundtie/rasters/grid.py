@@ -157,7 +157,7 @@ class Grid:
         centre = self.pixel_to_map([self.centre_px])[0]
         if self.crs.is_geographic:
             degrees = _degrees_per_unit(self.crs)
-            shrink = max(float(np.cos(np.deg2rad(centre[1] * degrees))), _LEAST_SHRINK)
+            shrink = _shrink(centre[1] * degrees)
             return METRES_PER_DEGREE * degrees * shrink, METRES_PER_DEGREE * degrees
         unit_m = float(self.crs.linear_units_factor[1])
         scale = _scale_on_the_ground(centre, unit_m, self.crs)
@@ -172,14 +172,14 @@ class Grid:
         On a map without longitudes, and outside of the projection's domain, they lie along x and y.
         """
         unit_m = np.array(self.metres_per_unit)
+        along_axes = np.diag(1 / unit_m)
         if self.crs is None or self.crs.is_geographic:
-            return np.diag(1 / unit_m)
+            return along_axes
         centre = reproject(self.pixel_to_map([self.centre_px]), self.crs, LON_LAT)
-        shrink = np.maximum(np.cos(np.deg2rad(centre[0, 1])), _LEAST_SHRINK)
-        half = np.diag([1 / shrink, 1.0]) * (_STEP_M / METRES_PER_DEGREE / 2)
+        half = np.diag([1 / _shrink(centre[0, 1]), 1.0]) * (_STEP_M / METRES_PER_DEGREE / 2)
         ends = reproject(np.concatenate([centre + half, centre - half]), LON_LAT, self.crs)
         if not np.isfinite(ends).all():
-            return np.diag(1 / unit_m)
+            return along_axes
         metres = (ends[:2] - ends[2:]) * unit_m
         return np.asarray(metres / np.linalg.norm(metres, axis=1, keepdims=True) / unit_m)
 
@@ -342,6 +342,13 @@ def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | Non
     with np.errstate(invalid="ignore"):
         turns = np.nan_to_num(np.rint((xy[:, :1] - longitude) / turn), posinf=0, neginf=0)
     return np.asarray(xy - turns * [turn, 0]) if turns.any() else xy
+
+
+def _shrink(latitude_deg: float) -> float:
+    """Return the length of a degree of longitude as a share of that of a degree of latitude."""
+    # Positions outside of a projection's domain are infinite.
+    with np.errstate(invalid="ignore"):
+        return max(float(np.cos(np.deg2rad(latitude_deg))), _LEAST_SHRINK)
 
 
 def _degrees_per_unit(crs: CRS) -> float:
