@@ -12,8 +12,7 @@ from typing import Any
 
 from ..call_paths import inputs_of
 from ..declaration import Tool
-from ..geometry.product_views import metadata_beside
-from ..geometry.views import files_named, is_item
+from ..geometry.views import files_beside, files_named
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..raster_names import facts_behind, local_files
@@ -111,9 +110,7 @@ def _beside(path: Path, listed: Listed) -> Iterator[Path]:
             yield path.with_name(name)
     if (mask := mask_beside(path)) is not None:
         yield mask[0]
-    if is_item(item := path.with_suffix(".json")):
-        yield item
-    yield from filter(Path.is_file, metadata_beside(path))
+    yield from files_beside(path)
 
 
 def _stems_beside(path: Path) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,7 +92,7 @@ class View:
         if not isinstance(image, (str, Path)):
             return None
         beside = Path(image).with_suffix(".json")
-        if is_item(beside):
+        if _is_item(beside):
             return read_view(beside)
         of_product = map(_product_view, metadata_beside(Path(image)))
         return next((view for view in of_product if view is not None), None)
@@ -111,6 +111,13 @@ def no_view(image: Any, name: str) -> ParameterError:
             f"the view of the {name} is not known: put its STAC item or its product's metadata "
             "beside it, or give views"
         )
+
+
+def files_beside(image: Path) -> Iterator[Path]:
+    """Yield the files beside an image that may state its view: STAC item, product's metadata."""
+    if _is_item(item := image.with_suffix(".json")):
+        yield item
+    yield from filter(Path.is_file, metadata_beside(image))
 
 
 def split_views(words: str | None) -> tuple[str | None, str | None]:
@@ -234,8 +241,8 @@ def _view(sensor: str, values: Mapping[str, float], origin: str) -> View:
     )
 
 
-def is_item(path: Path) -> bool:
-    """Return whether a file is a STAC item with a view; reports are JSON files, too."""
+def _is_item(path: Path) -> bool:
+    """Whether a file is a STAC item with a view; reports and transforms are JSON files, too."""
     try:
         found = read_json(path)
     except (OSError, ValueError):
