@@ -23,6 +23,7 @@ from groundtie.kinds import (
     RastersIn,
     Text,
     VectorIn,
+    Views,
 )
 from groundtie.registration.rules import RULES, Rule
 from groundtie.tools import load_tools
@@ -160,6 +161,7 @@ def values(kind: Kind) -> str:
         RastersIn: "rasters",
         Text: "text",
         VectorIn: "vector layer",
+        Views: "text",
     }
     return words[type(kind)]
 

@@ -24,6 +24,7 @@ from groundtie.kinds import (
     RasterIn,
     RasterOut,
     RastersIn,
+    Views,
 )
 
 TEXTS: dict[str, Any] = {"label": "Label", "help": "Help."}
@@ -153,6 +154,17 @@ def test_one_of_many_inputs_counts_too(tmp_path: Path) -> None:
     dates = ("dates", RastersIn(**TEXTS), (tmp_path / "a.tif", tmp_path / "items.json"))
     with pytest.raises(SameFileError, match=r"would also write .*items\.json, which is dates"):
         check_paths([dates, ("report", REPORT, tmp_path / "items.html")])
+
+
+def test_a_file_that_states_a_view_is_an_input(tmp_path: Path) -> None:
+    stated = f"radar azimuth=280 incidence=35; {tmp_path / 'item.json'}"
+    with pytest.raises(SameFileError, match="classifier is the same file as views"):
+        check_paths(
+            [
+                ("views", Views(**TEXTS), stated),
+                ("classifier", JSON_OUT, tmp_path / "item.json"),
+            ]
+        )
 
 
 def test_what_is_written_into_a_folder_is_no_other_file(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from .kinds import (
     InputKind,
     Kind,
     RastersIn,
+    Views,
     WrittenKind,
     shown_name,
 )
@@ -100,6 +101,8 @@ def check_numbers(name: str, path: Path) -> None:
 
 def inputs_of(kind: Kind, value: Any) -> tuple[Any, ...]:
     """Return the inputs that the checked value of a parameter names."""
+    if isinstance(kind, Views):
+        return kind.files_named(value)
     if value is None or not isinstance(kind, (InputKind, RastersIn)):
         return ()
     return value if isinstance(kind, RastersIn) else (value,)

@@ -22,6 +22,9 @@ AUTO = "auto"
 # Endings of a GeoTIFF.
 GEOTIFF = (".tif", ".tiff")
 
+# Endings of the files that state the view of an image: STAC items and products' metadata.
+VIEW_FILES = (".json", ".xml", ".imd")
+
 # Format of a report's numbers.
 REPORT_FORMAT = "groundtie-report/1"
 
@@ -289,6 +292,25 @@ class Text(Kind):
         if not is_utf8(value):
             raise ParameterError(f"{name} must be a text in UTF-8, not {value!a}")
         return value
+
+
+class Views(Text):
+    """Views of images, separated by semicolons: in words, or by the files that state them."""
+
+    def files_named(self, value: str | None) -> tuple[Path, ...]:
+        """Return the files among the views of a checked value."""
+        parts = (part.strip() for part in (value or "").split(";"))
+        return tuple(Path(part) for part in parts if is_view_file(part))
+
+    def located(self, value: str, folder: Path) -> str:
+        """Return the views with relative paths of their files beginning at a folder."""
+        parts = (part.strip() for part in value.split(";"))
+        return "; ".join(str(folder / part) if is_view_file(part) else part for part in parts)
+
+
+def is_view_file(view: str) -> bool:
+    """Return whether a view is the name of a file that states it."""
+    return view.lower().endswith(VIEW_FILES)
 
 
 class Crs(Text):

@@ -248,12 +248,15 @@ def test_the_key_stands_for_metadata_of_missions_beside_an_input(
     assert len(set(found)) == 3
 
 
-@pytest.mark.parametrize("name", ["b.json", "b_extended.json", "../annotation/b.xml", "named.json"])
+@pytest.mark.parametrize(
+    "name", ["b.json", "b_extended.json", "../annotation/b.xml", "named.json", "./named.json"]
+)
 def test_the_key_stands_for_the_files_that_state_a_view(
     folders: tuple[Path, Path], name: str
 ) -> None:
     path = folders[0] / name
-    views = {"views": str(path)} if name == "named.json" else {}
+    stated = {"named.json": str(path), "./named.json": "radar azimuth=90 incidence=35; named.json"}
+    views = {"views": stated[name]} if name in stated else {}
     row = {"reference": "b.tif", "surface_model": "a.tif", **views}
     path.parent.mkdir(exist_ok=True)
     found = []

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..declaration import Parameter, Tool
 from ..errors import GroundTieError, ParameterError
-from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, WrittenKind
+from ..kinds import Flag, InputKind, OutputKind, RastersIn, Text, Views, WrittenKind
 from ..raster_names import is_utf8, raster_name, require_possible
 from ..rasters.atomic import make_folder
 from ..runs import digest
@@ -139,6 +139,8 @@ def _value(parameter: Parameter, value: Any, name: str, inputs: Path, outputs: P
     if isinstance(kind, RastersIn):
         several = value.split(";") if isinstance(value, str) else value
         return [_located(one, inputs) for one in several] if isinstance(several, list) else several
+    if isinstance(kind, Views) and isinstance(value, str):
+        return kind.located(value, inputs)
     if isinstance(kind, Flag) and str(value).lower() in (*_YES, *_NO):
         return str(value).lower() in _YES
     if isinstance(kind, Text) and isinstance(value, (int, float)):

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..call_paths import inputs_of
 from ..declaration import Tool
-from ..geometry.views import files_beside, files_named
+from ..geometry.views import files_beside
 from ..kinds import Kind, RastersIn
 from ..masks.beside import mask_beside
 from ..raster_names import facts_behind, local_files
@@ -90,7 +90,6 @@ def facts_read(
             found += map(_facts, chain([path], inside, _beside(path, listed)))
             found += chain.from_iterable(map(facts_behind, sources_of(path)))
         facts += [(parameter.name, *one) for one in found if one[0] not in own]
-    facts += [("views", *_facts(path)) for path in files_named(values.get("views"))]
     return facts
 
 

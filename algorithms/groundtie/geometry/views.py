@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
+from ..kinds import is_view_file
 from ..rasters.reading import open_raster
 from ..strict_json import read_json
 from .product_views import CAMERA, RADAR, metadata_beside, read_product_view
@@ -29,8 +30,6 @@ _USAGE = (
     "sun-elevation=48'"
 )
 _WORD = re.compile(r"([a-z-]+)=(-?\d+(?:\.\d+)?)°?")
-
-_SUFFIXES = (".json", ".xml", ".imd")
 
 # The angles that a view can state, and the range of each.
 _RANGES = {
@@ -134,15 +133,9 @@ def split_views(words: str | None) -> tuple[str | None, str | None]:
     return parts[0], parts[1] if len(parts) > 1 else None
 
 
-def files_named(words: str | None) -> list[Path]:
-    """Return the files that words for both images (see `split_views`) name."""
-    parts = [part.strip() for part in (words or "").split(";")]
-    return [Path(part) for part in parts if part.lower().endswith(_SUFFIXES)]
-
-
 def stated_view(given: str) -> View:
     """Return the view that a named file, or words, state; `ParameterError` if they state none."""
-    if not given.lower().endswith(_SUFFIXES):
+    if not is_view_file(given):
         return parse_view(given)
     path = Path(given)
     try:

@@ -33,7 +33,7 @@ def coregister(
     dem: registration.TerrainDem = None,
     input_dem: registration.InputDem = None,
     surface_model: registration.SurfaceModel = None,
-    views: registration.Views = None,
+    views: registration.ImageViews = None,
     matching_pixel_size: general.MatchingPixelSize = None,
     output_grid: registration.OutputGrid = "reference",
     workers: general.Workers = None,

@@ -18,6 +18,7 @@ from ...kinds import (
     RasterOut,
     Text,
     VectorOut,
+    Views,
 )
 from ...registration.registered_output import OUTPUT_GRIDS
 from .general import MASK_HELP, report_page
@@ -146,9 +147,9 @@ _TERRAIN_VIEW = (
     "and register tries azimuths. If it is a surface model of a town, 'surface radar azimuth=280 "
     "incidence=35' for a radar image; 'surface radar' takes these from the input's metadata."
 )
-Views = Annotated[str | None, Text(help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
-SurfaceViews = Annotated[str | None, Text(help=_VIEWS, advanced=True)]
-TerrainView = Annotated[str | None, Text(label="View", help=_TERRAIN_VIEW, advanced=True)]
+ImageViews = Annotated[str | None, Views(help=f"{_VIEWS} {_TERRAIN_VIEW}", advanced=True)]
+SurfaceViews = Annotated[str | None, Views(help=_VIEWS, advanced=True)]
+TerrainView = Annotated[str | None, Views(label="View", help=_TERRAIN_VIEW, advanced=True)]
 OutputGrid = Annotated[
     str,
     Choice(
