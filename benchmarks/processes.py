@@ -42,12 +42,15 @@ def measure(command: Sequence[str]) -> Measured:
         The command failed; a refused registration (exit code 3) is no failure.
     """
     paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    # An installed package is compiled once, as all peers are, and not by each process.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     with tempfile.TemporaryDirectory() as folder:
         result, output = Path(folder) / "measured.json", str(Path(folder) / "output.tif")
         words = [output if word == OUTPUT else word for word in command]
         done = subprocess.run(
             [sys.executable, "-I", "-S", _MEASURE, result, *words],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            env=environment,
             capture_output=True,
             text=True,
             check=True,

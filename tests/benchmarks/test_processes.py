@@ -47,6 +47,12 @@ def test_the_package_can_be_imported_by_the_command(monkeypatch: pytest.MonkeyPa
     assert Path(found.output.strip()) == processes._PACKAGE / "groundtie" / "__init__.py"
 
 
+def test_the_command_keeps_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    found = measure(python("import sys; print(sys.dont_write_bytecode)"))
+    assert found.output.strip() == "False"
+
+
 def test_output_stands_for_a_new_file_that_is_thrown_away() -> None:
     code = "import sys; open(sys.argv[1], 'x').close(); print(sys.argv[1])"
     paths = [measure(python(code, OUTPUT)).output.strip() for _ in range(2)]
