@@ -31,6 +31,9 @@ _SAME_PX = 1e-3
 # or column is missing, one of them is off by half a pixel or more.
 _EVEN_PX = 0.05
 
+# Coordinates of all pixels, by which rioxarray locates an array that is rotated on its map.
+_TURNED = ("xc", "yc")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Raster:
@@ -131,12 +134,11 @@ class Raster:
             values = np.where(np.ma.getmaskarray(values), np.nan, held.data)
         dims = ("band", "y", "x")[-values.ndim :]
         place = Affine.identity() if self.transform is None else self.transform
-        coords = {}
-        if place.is_rectilinear:
-            coords = {
-                "x": place.c + place.a * (np.arange(self.width) + 0.5),
-                "y": place.f + place.e * (np.arange(self.height) + 0.5),
-            }
+        col, row = np.arange(self.width) + 0.5, np.arange(self.height)[:, None] + 0.5
+        x, y = (p * col + q * row + r for p, q, r in (place[:3], place[3:6]))
+        coords: dict[str, Any] = {"x": x[0], "y": y[:, 0]}
+        if (place.b, place.d) != (0, 0):  # as rioxarray locates rotated arrays
+            coords = {name: (("y", "x"), at) for name, at in zip(_TURNED, (x, y), strict=True)}
         array = xarray.DataArray(values, coords, dims).rio.write_transform(place)
         array = array if self.crs is None else array.rio.write_crs(self.crs)
         return array if self.nodata is None else array.rio.write_nodata(self.nodata)
@@ -221,17 +223,36 @@ def _transform_of(array: Any) -> Affine | None:
     """Return the transform of a `DataArray`; None if nothing locates it."""
     located = array.rio
     stored = located.transform()
-    if located.x_dim not in array.coords or located.y_dim not in array.coords:
-        # rioxarray returns the identity if there is no transform.
-        return None if stored.is_identity else stored
-    for dim in (located.x_dim, located.y_dim):
-        _require_even(str(dim), np.asarray(array.coords[dim]))
     # The stored transform is exact, but may be that of a larger array of which this is a part:
     # coordinates show which.
-    found = located.transform(recalc=True)
+    if located.x_dim in array.coords and located.y_dim in array.coords:
+        for dim in (located.x_dim, located.y_dim):
+            _require_even(str(dim), np.asarray(array.coords[dim]))
+        found = located.transform(recalc=True)
+    elif all(name in array.coords for name in _TURNED):
+        found = _transform_by(*(np.asarray(array.coords[name]) for name in _TURNED))
+    else:
+        # rioxarray returns the identity if there is no transform.
+        return None if stored.is_identity else stored
     corners = np.array([[0, 0, 1], [located.width, located.height, 1]])
     apart = corners @ np.subtract(found[:6], stored[:6]).reshape(2, 3).T
-    return stored if np.abs(apart).max() < _SAME_PX * abs(found.a) else found
+    return stored if np.abs(apart).max() < _SAME_PX * np.hypot(found.a, found.d) else found
+
+
+def _transform_by(x: NDArray[Any], y: NDArray[Any]) -> Affine:
+    """Return the transform by the coordinates of all pixels of a rotated array, shape (h, w)."""
+    xy = np.stack([x, y])
+    height, width = x.shape
+    right = (xy[:, 0, -1] - xy[:, 0, 0]) / max(width - 1, 1)
+    down = (xy[:, -1, 0] - xy[:, 0, 0]) / max(height - 1, 1)
+    cols, rows = np.arange(width), np.arange(height)[:, None]
+    even = np.stack(
+        [x[0, 0] + right[0] * cols + down[0] * rows, y[0, 0] + right[1] * cols + down[1] * rows]
+    )
+    if not np.abs(xy - even).max() <= _EVEN_PX * np.hypot(*right):
+        raise _uneven(", ".join(_TURNED))
+    corner = xy[:, 0, 0] - (right + down) / 2
+    return Affine(*(float(n) for axis in zip(right, down, corner, strict=True) for n in axis))
 
 
 def _require_even(name: str, coordinates: NDArray[Any]) -> None:
@@ -242,10 +263,14 @@ def _require_even(name: str, coordinates: NDArray[Any]) -> None:
     apart = np.abs(coordinates - even).max()
     # The step is NaN for a single coordinate, and if one of several is NaN.
     if coordinates.size > 1 and not apart <= _EVEN_PX * abs(step) + 2 * rounded:
-        raise GeoreferencingError(
-            f"the coordinates {name} of an array are uneven: rows or columns of it are missing, "
-            "or in another order"
-        )
+        raise _uneven(name)
+
+
+def _uneven(names: str) -> GeoreferencingError:
+    return GeoreferencingError(
+        f"the coordinates {names} of an array are uneven: rows or columns of it are missing, or in "
+        "another order"
+    )
 
 
 def _crs(crs: Any) -> CRS | None:

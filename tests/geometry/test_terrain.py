@@ -139,6 +139,18 @@ def test_a_stored_transform_finds_its_heights(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_transform(path)(places()), found(places()), atol=1e-6)
 
 
+def test_it_names_the_heights_that_were_opened_whatever_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("there", "other"):
+        (tmp_path / name).mkdir()
+        write_raster(tmp_path / name / "dem.tif", heights(hill)[None], GRID, ["height"])
+    monkeypatch.chdir(tmp_path / "there")
+    found = Terrain.open("dem.tif", None, UTM, REGION)
+    monkeypatch.chdir(tmp_path / "other")
+    assert Path(found.to_json()["dem"]) == (tmp_path / "there" / "dem.tif").resolve()
+
+
 def test_it_finds_them_beside_itself_when_both_were_moved(tmp_path: Path) -> None:
     before, after = tmp_path / "before", tmp_path / "after"
     before.mkdir()

@@ -24,7 +24,7 @@ from groundtie.errors import (
     RasterOpenError,
     SameFileError,
 )
-from groundtie.rasters.grid import PIXEL_COORDINATES
+from groundtie.rasters.grid import PIXEL_COORDINATES, compose
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.rasters.writing import shared_nodata
@@ -271,6 +271,22 @@ class TestXarray:
         assert part.transform is not None
         assert part.transform.a == pytest.approx(2 * GRID.transform.a)
 
+    @pytest.mark.parametrize("turned", [TURNED, Affine(0, 2, 500_000, 2, 0, 5_000_000)])
+    def test_a_part_of_a_rotated_array_lies_where_it_was(
+        self, opened: Any, tmp_path: Path, turned: Affine
+    ) -> None:
+        import rioxarray
+
+        path = write_raster(tmp_path / "turned.tif", image("uint16"), transform=turned, crs=UTM)
+        array = rioxarray.open_rasterio(path)
+        for whole in (array, Raster.from_xarray(array).to_xarray()):
+            assert_read_alike(whole, path)
+            part = Raster.from_xarray(whole.isel(x=slice(10, 30), y=slice(4, 20)))
+            expected = compose(turned, Affine.translation(10, 4))
+            np.testing.assert_allclose(part.transform[:6], expected[:6], atol=1e-6)
+            with pytest.raises(GeoreferencingError, match=r"coordinates xc, yc .* uneven"):
+                Raster.from_xarray(whole.isel(x=np.r_[0:10, 14:30]))
+
     def test_without_coordinates_a_crs_locates_nothing(self, opened: Any, tmp_path: Path) -> None:
         bare = opened[1].drop_vars(["x", "y", "spatial_ref"]).rio.write_crs(UTM)
         path = write_raster(tmp_path / "bare.tif", opened[1].values, crs=UTM, nodata=7)
@@ -366,6 +382,28 @@ def test_an_array_without_coordinates(
     assert (raster.transform, raster.crs, raster.nodata) == (transform, crs, 7)
     with open_raster(bare) as source:
         assert source.grid.is_georeferenced == (transform is not None)
+
+
+@pytest.mark.parametrize("turned", [TURNED, Affine(0, 2, 500_000, 2, 0, 5_000_000)])
+def test_a_part_of_a_rotated_array_lies_at_its_coordinates(
+    monkeypatch: pytest.MonkeyPatch, turned: Affine
+) -> None:
+    """Also where rioxarray is not installed: it stores the transform of the whole array."""
+    cols, rows = np.meshgrid(np.arange(10, 30) + 0.5, np.arange(4, 20) + 0.5)
+    xc, yc = (a * cols + b * rows + c for a, b, c in (turned[:3], turned[3:6]))
+    located = SimpleNamespace(x_dim="x", y_dim="y", crs=UTM, nodata=None, transform=lambda: turned)
+    located.width, located.height = 20, 16
+    part = SimpleNamespace(
+        dims=("y", "x"),
+        coords={"xc": xc, "yc": yc},
+        rio=located,
+        transpose=lambda *_: SimpleNamespace(values=np.zeros((16, 20))),
+    )
+    take_for_installed(monkeypatch)
+    expected = compose(turned, Affine.translation(10, 4))
+    found = Raster.from_xarray(part).transform
+    assert found is not None
+    np.testing.assert_allclose(found[:6], expected[:6], atol=1e-6)
 
 
 def test_an_array_without_rioxarray_is_explained() -> None:

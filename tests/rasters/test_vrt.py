@@ -22,6 +22,7 @@ from groundtie.errors import ParameterError
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.reading import open_raster
+from groundtie.rasters.vrt import write_vrt
 
 GRID = utm_grid(70, 50)
 VALUES = np.random.default_rng(2).integers(0, 200, (2, 50, 70)).astype(np.uint8)
@@ -234,6 +235,22 @@ def test_a_file_in_an_archive_is_found_from_any_folder(
     groundtie.warp("/vsizip/in/a.zip/a.tif", output, transform=transform)
     monkeypatch.chdir(tmp_path / "out")
     with rasterio.open(output) as moved:
+        np.testing.assert_array_equal(moved.read(), VALUES)
+
+
+def test_the_file_is_the_one_that_was_opened_whatever_the_working_folder(
+    tmp_path: Path, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "other").mkdir()
+    write_raster(tmp_path / "other" / "a.tif", VALUES + 50, GRID)
+    monkeypatch.chdir(image.parent)
+    with open_raster("a.tif") as source:
+        monkeypatch.chdir(tmp_path / "other")
+        write_vrt(source, GRID.shifted(1.0, 2.0), tmp_path / "out" / "b.vrt")
+        source.close()
+        np.testing.assert_array_equal(source.read_bands(source.window)[0], VALUES)
+        assert source.is_same_as(open_raster(image))
+    with rasterio.open(tmp_path / "out" / "b.vrt") as moved:
         np.testing.assert_array_equal(moved.read(), VALUES)
 
 

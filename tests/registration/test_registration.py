@@ -160,6 +160,28 @@ class TestWhatIsWrittenOverNothing:
         found.warp(output=output)
         assert mask.read_bytes() == b""
 
+    def test_nor_over_an_input_from_another_working_folder(
+        self, textured: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        scene, other = tmp_path / "scene", tmp_path / "other"
+        for folder in (scene, other):
+            folder.mkdir()
+        for name in ("reference", "input"):
+            (scene / f"{name}.tif").write_bytes(getattr(textured, name).read_bytes())
+        before = (scene / "input.tif").read_bytes()
+        (scene / "mask.tif").touch()
+        monkeypatch.chdir(tmp_path)
+        paths = "scene/reference.tif", "scene/input.tif"
+        with Call(*paths, RegistrationFiles()).register(Specification()) as found:
+            found = replace(found, parameters={"input_mask": Path("scene/mask.tif")})
+            monkeypatch.chdir(other)
+            for name in ("input", "mask"):
+                with pytest.raises(SameFileError, match=r"same file as (raster|input_mask)"):
+                    found.warp(output=scene / f"{name}.tif")
+            found.close()
+            found.warp(output="o.tif")  # reads the input again
+        assert (scene / "input.tif").read_bytes() == before
+
     @pytest.mark.parametrize("name", ["o.png", "o", "o.html"])
     def test_rasters_have_the_suffix_of_one(
         self, registration: Registration, tmp_path: Path, name: str

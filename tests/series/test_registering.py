@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
@@ -250,6 +250,15 @@ def test_without_a_reference_nothing_may_match(matching: Make) -> None:
     found = matching(4, bad=(0, 1, 2, 3))
     assert found.placed(found.freely()).keys() <= {0, 1, 2, 3}
     assert not found.links
+
+
+def test_what_is_known_has_the_present_names_of_its_dates(matching: Make) -> None:
+    first = matching(3)
+    first.from_hub(0)
+    known = {one.key: replace(one, first="a", second="b") for one in first.results.values()}
+    again = matching(3, known=known)
+    names = {ends: (one.first, one.second) for ends, one in again.results.items()}
+    assert names == {(i, j): (str(i), str(j)) for i, j in first.results}
 
 
 def test_what_is_known_is_not_registered_again(matching: Make) -> None:

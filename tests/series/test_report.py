@@ -16,12 +16,13 @@ from rasterio.crs import CRS
 from series_dates import FRAME, GRID, shifted
 
 from groundtie.geometry.transform import Transform
-from groundtie.rasters.grid import Grid, reproject
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 from groundtie.rasters.pair import Image
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.evidence import DateEvidence
 from groundtie.series.closure import Closure
 from groundtie.series.dates import Date
+from groundtie.series.frame import SeriesFrame
 from groundtie.series.inputs import Listed
 from groundtie.series.network import Adjustment
 from groundtie.series.report import SeriesReport, closure_figure, shift_figure
@@ -75,6 +76,16 @@ def test_the_worst_stands_first() -> None:
     assert [row["name"] for row in values["rows"]] == ["date-2", "date-1", "date-0"]
     assert values["rejected"] == ["date-0 – date-2"]
     assert (values["registered"], values["count"]) == (1, 2)
+
+
+def test_only_with_georeferencing_are_there_metres() -> None:
+    found = series(list(DAYS))
+    on_pixels = Grid(PIXEL_COORDINATES, None, GRID.width, GRID.height)
+    bare = replace(found, frame=SeriesFrame.around(on_pixels, [on_pixels]))
+    for one, shift_m in ((found, [20, 10]), (bare, [None, None])):
+        row = one.rows()[1]
+        assert [row["shift_x_px"], row["shift_y_px"]] == [2, -1]
+        assert [row["shift_x_m"], row["shift_y_m"]] == shift_m
 
 
 def test_thumbnails_show_the_ground_on_a_map_of_another_crs(tmp_path: Path) -> None:

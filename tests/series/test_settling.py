@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,6 +76,14 @@ def test_a_date_at_the_end_that_nothing_confirms() -> None:
     """Of its two registrations one is wrong: its neighbour has another loop, it has none."""
     found = settled(results(5, star_and_chain(5), {(0, 4): (4.0, -3.0)}), 5)
     assert rules(found) == {4: "loops do not close"}
+
+
+def test_a_date_that_the_hub_hardly_overlaps_is_not_refused_by_it() -> None:
+    found = results(3, [(0, 1), (1, 2)], refused=((0, 2),))
+    assert rules(settled(found, 3)) == {2: "one way alone"}
+    reason = "they overlap by 40 × 300 matching pixels; at least 144 × 144 are needed"
+    found[0, 2] = replace(found[0, 2], rule="", reason=reason)
+    assert rules(settled(found, 3)) == {}
 
 
 def test_a_date_that_the_hub_refuses_needs_a_second_way() -> None:

@@ -144,5 +144,5 @@ def _surface(
 
 
 def _place(surface: RasterSurface) -> str:
-    path = Path(surface.source.path)
+    path = Path(surface.source.place or surface.source.path)
     return str(path.resolve() if path.exists() else path)

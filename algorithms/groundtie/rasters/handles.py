@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
@@ -51,10 +52,20 @@ class FileHandles:
         The file, or GDAL's name.
     overview
         Number of the overview to read, from 0; None: the raster itself.
+
+    Attributes
+    ----------
+    place
+        Name of the file in any working folder.
+    identity
+        Location of the file, or GDAL's name.
     """
 
     def __init__(self, path: str, overview: int | None = None) -> None:
         self._path = path
+        # By these the file stays the same one if the program changes its working folder.
+        self.place = os.path.abspath(path) if os.path.exists(path) else path
+        self.identity = identity(path)
         self._options = {} if overview is None else {"overview_level": overview}
         self._lock = threading.Lock()
         self._turn: contextlib.AbstractContextManager[Any] = (
@@ -62,19 +73,14 @@ class FileHandles:
         )
         self._free: list[Any] = []
 
-    @property
-    def identity(self) -> Hashable:
-        """Location of the file, or GDAL's name."""
-        return identity(self._path)
-
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
         """Lend a handle to one thread at a time."""
         with self._turn:
-            with _reading(self._path), environment(self._path):
+            with _reading(self._path, self.place), environment(self._path):
                 with self._lock:
                     dataset = self._free.pop() if self._free else None
-                dataset = dataset or rasterio.open(self._path, sharing=False, **self._options)
+                dataset = dataset or rasterio.open(self.place, sharing=False, **self._options)
                 with env_ctx_if_needed():  # GDAL's messages in this thread go to rasterio's logger
                     yield dataset
             with self._lock:
@@ -93,16 +99,12 @@ class OpenDataset:
     def __init__(self, dataset: Any) -> None:
         self._dataset = dataset
         self._lock = threading.Lock()
-
-    @property
-    def identity(self) -> Hashable:
-        """Location of the file, the same as for other handles of it."""
-        return identity(self._dataset.name)
+        self.identity = identity(dataset.name)
 
     @contextlib.contextmanager
     def borrow(self) -> Iterator[Any]:
         """Lend the dataset, once no other thread uses it."""
-        with _reading(self._dataset.name), self._lock:
+        with _reading(self._dataset.name, self._dataset.name), self._lock:
             if self._dataset.closed:
                 raise RasterOpenError(f"the dataset is closed: {self._dataset.name}")
             yield self._dataset
@@ -160,7 +162,7 @@ def read_by(
 
 
 @contextlib.contextmanager
-def _reading(name: str) -> Iterator[None]:
+def _reading(name: str, place: str) -> Iterator[None]:
     try:
         yield
     # Not all errors of rasterio are RasterioErrors: GDAL's own and CRSError are not.
@@ -169,7 +171,7 @@ def _reading(name: str) -> Iterator[None]:
     except Exception as error:
         if not raised_by(error, "rasterio"):
             raise
-        reason = str(error.__cause__ or error).removeprefix(f"{name}: ")
+        reason = str(error.__cause__ or error).replace(place, name).removeprefix(f"{name}: ")
         if is_remote(name):
             reason = reason_of_server(reason, name)
         raise RasterOpenError(f"cannot read {name}: {reason}") from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -87,12 +87,20 @@ class RasterSource:
 
     def is_same_as(self, other: RasterSource) -> bool:
         """Return whether both read one and the same raster."""
-        return self._handles.identity == other._handles.identity
+        return self.identity == other.identity
 
     @property
-    def is_file(self) -> bool:
-        """Whether its name opens it again: it is neither in memory nor the caller's dataset."""
-        return isinstance(self._handles, FileHandles)
+    def identity(self) -> Hashable:
+        """Key that is equal for sources of the same raster, in any working folder."""
+        return self._handles.identity
+
+    @property
+    def place(self) -> str | None:
+        """Name that opens its file again in any working folder.
+
+        None: it is in memory, or the caller's dataset.
+        """
+        return self._handles.place if isinstance(self._handles, FileHandles) else None
 
     @property
     def count(self) -> int:

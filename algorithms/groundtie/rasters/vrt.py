@@ -68,9 +68,9 @@ def write_vrt(source: RasterSource, grid: Grid, path: Path) -> None:
     OutputError
         The file cannot be written.
     """
-    if not source.is_file:
+    if source.place is None:
         raise ParameterError(f"a {SUFFIX} refers to a file, which {source.path} is not")
-    name = _absolute(source.path)
+    name = _absolute(source.place)
     with writing(path), environment(source.path):
         with rasterio.open(name) as dataset:
             is_virtual = dataset.driver == "VRT"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,13 @@ _RESAMPLING = Choice(help="How pixels are interpolated.", choices=METHODS)
 _WORKERS = Number(help="Number of threads.", integer=True, minimum=1, maximum=MOST_WORKERS)
 
 
+def _working_folder() -> Path:
+    """Return the working folder; where it was removed, relative paths name nothing."""
+    with suppress(OSError):
+        return Path.cwd()
+    return Path()
+
+
 @dataclass(frozen=True, repr=False)
 class Registration:
     """A judged registration.
@@ -85,6 +92,8 @@ class Registration:
         The basis of the verdict; None without a transform.
     parameters
         The parameters that the tool was called with.
+    folder
+        The working folder then, at which their relative paths begin.
     started
         When the work began, by `time.perf_counter`.
     files
@@ -105,6 +114,7 @@ class Registration:
     check: Check | None = None
     evidence: RegistrationEvidence | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    folder: Path = field(default_factory=_working_folder)
     started: float = 0.0
     files: Mapping[str, Path] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
@@ -252,13 +262,12 @@ class Registration:
         These are the warped raster, the images, and all other inputs among the parameters.
         """
         read: dict[str, Any] = {
-            parameter: value
+            parameter: self.folder / value
             for parameter, value in self.parameters.items()
             if isinstance(value, Path) and value not in self.files.values()
         }
-        images = {"reference": self.pair.reference.source, "input": self.pair.input.source}
-        images |= {} if warped is None else {"raster": warped}
-        read |= {role: source.path for role, source in images.items()}
+        read |= {"reference": self.pair.reference.source, "input": self.pair.input.source}
+        read |= {} if warped is None else {"raster": warped}
         check_paths([*((other, _READ, value) for other, value in read.items()), (name, kind, path)])
 
     def page(self) -> Report:

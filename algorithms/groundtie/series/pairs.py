@@ -98,7 +98,7 @@ class PairResult:
         Digest of the files, the settings and the version; empty: the registration failed for a
         passing reason and is done again in the next run.
     accepted, rule, reason
-        The verdict.
+        The verdict; without a rule, the registration failed and was not judged.
     check_rmse_px
         Error at check points, in matching pixels; None: there is none.
     displacement, covariance

@@ -77,10 +77,13 @@ class Matching:
         if not self.known:
             return
         for i, j in permutations(range(len(self.dates)), 2):
+            first, second = self.dates[i], self.dates[j]
             for settings in (self.settings, self.settings.of_loops()):
-                key = pair_key(self.dates[i], self.dates[j], settings, self.frame)
+                key = pair_key(first, second, settings, self.frame)
                 if key in self.known:
-                    self.results[i, j] = self.known[key]
+                    # The same files may have had other names.
+                    known = replace(self.known[key], first=first.name, second=second.name)
+                    self.results[i, j] = known
                     self.reused += 1
                     break
 

@@ -109,16 +109,17 @@ class SeriesDate:
         displacement, covariance = verdict.displacement, verdict.covariance
         if displacement is None or covariance is None:
             return values
-        centre = frame.square.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
-        shift_m = (centre[1] - centre[0]) * frame.grid.metres_per_unit
-        return values | {
+        values |= {
             "shift_x_px": float(displacement[0]),
             "shift_y_px": float(displacement[1]),
-            "shift_x_m": float(shift_m[0]),
-            "shift_y_m": float(shift_m[1]),
             "rms_px": rms_px(displacement),
             "sigma_px": sigma_px(covariance),
         }
+        if not frame.grid.is_georeferenced:  # there are no metres
+            return values
+        centre = frame.square.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
+        shift_m = (centre[1] - centre[0]) * frame.grid.metres_per_unit
+        return values | {"shift_x_m": float(shift_m[0]), "shift_y_m": float(shift_m[1])}
 
 
 @dataclass(frozen=True)

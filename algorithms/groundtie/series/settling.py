@@ -153,7 +153,11 @@ class _AdjustedNetwork:
             len(around),
             bool(self.found.reached[date]),
             bool(self.found.confirmed[date]),
-            any(self.hub in ends and not one.accepted for ends, one in tried.items()),
+            # Without a rule it failed, as for too little overlap: nothing speaks against the date.
+            any(
+                self.hub in ends and not one.accepted and bool(one.rule)
+                for ends, one in tried.items()
+            ),
         )
 
     def verdict(self, date: int) -> DateVerdict:
