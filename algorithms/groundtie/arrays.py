@@ -32,7 +32,7 @@ _SAME_PX = 1e-3
 _EVEN_PX = 0.05
 
 # Coordinates of all pixels, by which rioxarray locates an array that is rotated on its map.
-_TURNED = ("xc", "yc")
+_ROTATED = ("xc", "yc")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,7 +138,7 @@ class Raster:
         x, y = (p * col + q * row + r for p, q, r in (place[:3], place[3:6]))
         coords: dict[str, Any] = {"x": x[0], "y": y[:, 0]}
         if (place.b, place.d) != (0, 0):  # as rioxarray locates rotated arrays
-            coords = {name: (("y", "x"), at) for name, at in zip(_TURNED, (x, y), strict=True)}
+            coords = {name: (("y", "x"), at) for name, at in zip(_ROTATED, (x, y), strict=True)}
         array = xarray.DataArray(values, coords, dims).rio.write_transform(place)
         array = array if self.crs is None else array.rio.write_crs(self.crs)
         return array if self.nodata is None else array.rio.write_nodata(self.nodata)
@@ -229,8 +229,8 @@ def _transform_of(array: Any) -> Affine | None:
         for dim in (located.x_dim, located.y_dim):
             _require_even(str(dim), np.asarray(array.coords[dim]))
         found = located.transform(recalc=True)
-    elif all(name in array.coords for name in _TURNED):
-        found = _transform_by(*(np.asarray(array.coords[name]) for name in _TURNED))
+    elif all(name in array.coords for name in _ROTATED):
+        found = _transform_by(*(np.asarray(array.coords[name]) for name in _ROTATED))
     else:
         # rioxarray returns the identity if there is no transform.
         return None if stored.is_identity else stored
@@ -250,7 +250,7 @@ def _transform_by(x: NDArray[Any], y: NDArray[Any]) -> Affine:
         [x[0, 0] + right[0] * cols + down[0] * rows, y[0, 0] + right[1] * cols + down[1] * rows]
     )
     if not np.abs(xy - even).max() <= _EVEN_PX * np.hypot(*right):
-        raise _uneven(", ".join(_TURNED))
+        raise _uneven(", ".join(_ROTATED))
     corner = xy[:, 0, 0] - (right + down) / 2
     return Affine(*(float(n) for axis in zip(right, down, corner, strict=True) for n in axis))
 
