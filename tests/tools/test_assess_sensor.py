@@ -99,6 +99,20 @@ def test_points_without_heights_take_the_grounds(files: dict[str, Path], tmp_pat
     assert result.summary()["after"] is None
 
 
+def test_points_off_what_wrong_rpcs_see_take_the_grounds_heights(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    dem = write_dem(tmp_path / "dem.tif", size=120, steepness=0.0)
+    write_positions(files["image"], TRUTH.shifted((700.0, 0.0)))
+    px = np.random.default_rng(0).uniform(50, 450, (20, 2))
+    rows = np.column_stack([TRUTH.localise(px, 300.0), px])
+    lines = ["reference_x,reference_y,input_col,input_row,reference_crs"]
+    lines += [",".join(f"{v:.12f}" for v in row) + ",EPSG:4326" for row in rows]
+    files["check_points"].write_text("\n".join(lines))
+    result = groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
+    np.testing.assert_allclose(result.errors["before"].error_px, [(-700.0, 0.0)] * 20, atol=1e-3)
+
+
 def test_without_points_nothing_is_judged(files: dict[str, Path], tmp_path: Path) -> None:
     files["check_points"].write_text(
         "reference_x,reference_y,input_col,input_row,state\n9.0,45.15,1,2,rejected: blunder\n"

@@ -251,4 +251,14 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     surface = surface_around(source, exact, lon_lat, fill_open=False)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
-    return replace(surface, to_px=lambda places: fast(near_longitude(places, middle, LON_LAT)))
+
+    def to_px(places: FloatArray) -> FloatArray:
+        places = near_longitude(places, middle, LON_LAT)
+        px = fast(places)
+        # Ground control may lie beyond the region, above all if the RPCs are wrong.
+        beyond = np.isnan(px[:, 0]) & np.isfinite(places).all(axis=1)
+        if beyond.any():
+            px[beyond] = exact(places[beyond])
+        return px
+
+    return replace(surface, to_px=to_px)
