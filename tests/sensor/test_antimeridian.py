@@ -132,6 +132,28 @@ def test_a_geoid_of_the_whole_earth_serves_both_sides(tmp_path: Path) -> None:
         np.testing.assert_allclose(heights.at(places), slope(places[:, 0], 180.0) + 40, atol=0.5)
 
 
+@pytest.mark.parametrize("middle", [179.8, 179.88, 179.99, 180.0, -179.95])
+@pytest.mark.parametrize("first", [-180.0, -179.875, 0.0])
+def test_a_geoid_is_interpolated_where_its_first_and_last_column_meet(
+    tmp_path: Path, middle: float, first: float
+) -> None:
+    middle += first + 180
+    lon = first + 0.25 * np.arange(1440)
+    undulations = 20 + 40 * np.cos(np.deg2rad(lon - first - 60))
+    grid = Grid(Affine(0.25, 0, first - 0.125, 0, -0.25, 90.125), LON_LAT, 1440, 721)
+    rows = np.broadcast_to(undulations.astype(np.float32), (721, 1440))
+    geoid = write_raster(tmp_path / "geoid.tif", rows, grid)
+    dem = write_slope(tmp_path / "dem.tif", middle, middle - 0.2, middle + 0.2, 0.001)
+    region = np.array([[middle - 0.04, 45.14], [middle + 0.04, 45.16]])
+    places = np.random.default_rng(0).uniform(*region, (200, 2))
+    expected = np.interp(places[:, 0], lon, undulations, period=360)
+    with open_raster(dem) as terrain, open_raster(geoid) as undulation:
+        plain = terrain_heights(terrain, None, region)
+        raised = terrain_heights(terrain, undulation, region)
+        for each in (places, by_turns(places)):
+            np.testing.assert_allclose(raised.at(each) - plain.at(each), expected, atol=1e-3)
+
+
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4258", "EPSG:32660"])
 def test_errors_are_those_of_the_rpcs(tmp_path: Path, crs: str) -> None:
     truth = across(180.0)

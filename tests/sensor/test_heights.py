@@ -81,6 +81,23 @@ def test_voids_are_filled_also_those_that_nobody_declared(tmp_path: Path) -> Non
         assert np.abs(found - relief(PLACES)).max() < 60
 
 
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32632"])
+def test_beyond_the_region_heights_are_known_but_voids_are_not_filled(
+    tmp_path: Path, crs: str
+) -> None:
+    holes = np.zeros((60, 60), bool)
+    holes[:, 52:56] = True
+    with open_raster(write_dem(tmp_path / "dem.tif", crs, holes=holes)) as dem:
+        values = np.where(holes, np.nan, dem.read(dem.window)[0])
+        place = np.stack(np.meshgrid(np.arange(59.0), np.arange(59.0)), -1).reshape(-1, 2) + 0.3
+        lon_lat = reproject(dem.grid.pixel_to_map(place), dem.grid.crs, LON_LAT)
+        heights = terrain_heights(dem, None, REGION)
+        found, measured = heights.at(lon_lat), heights.is_measured(lon_lat)
+    expected = RegularGridInterpolator((np.arange(60), np.arange(60)), values)(place[:, ::-1])
+    np.testing.assert_allclose(found, expected, atol=0.02, equal_nan=True)
+    np.testing.assert_array_equal(measured, np.isfinite(expected))
+
+
 def test_beyond_the_terrain_model_heights_are_not_known(tmp_path: Path) -> None:
     with open_raster(write_dem(tmp_path / "dem.tif")) as dem:
         heights = terrain_heights(dem, None, REGION)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import cv2
@@ -97,6 +98,41 @@ def test_points_without_heights_take_the_grounds(files: dict[str, Path], tmp_pat
     result = groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
     np.testing.assert_allclose(result.errors["before"].error_px, [BIAS] * 3, atol=1e-3)
     assert result.summary()["after"] is None
+
+
+def test_points_off_what_wrong_rpcs_see_take_the_grounds_heights(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    dem = write_dem(tmp_path / "dem.tif", size=120, steepness=0.0)
+    write_positions(files["image"], TRUTH.shifted((700.0, 0.0)))
+    px = np.random.default_rng(0).uniform(50, 450, (20, 2))
+    rows = np.column_stack([TRUTH.localise(px, 300.0), px])
+    lines = ["reference_x,reference_y,input_col,input_row,reference_crs"]
+    lines += [",".join(f"{v:.12f}" for v in row) + ",EPSG:4326" for row in rows]
+    files["check_points"].write_text("\n".join(lines))
+    result = groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
+    np.testing.assert_allclose(result.errors["before"].error_px, [(-700.0, 0.0)] * 20, atol=1e-3)
+
+
+def test_points_where_no_height_is_known_are_counted(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    # The terrain model ends 250 m around the image's middle.
+    dem = write_dem(tmp_path / "dem.tif", size=20, steepness=0.0)
+    px = np.array([[300.0, 250.0], [280.0, 230.0], [20.0, 250.0]])
+    rows = np.column_stack([TRUTH.localise(px, 300.0), px])
+    head = "reference_x,reference_y,input_col,input_row,reference_crs,role"
+    lines = [",".join(f"{v:.12f}" for v in row) + ",EPSG:4326,check" for row in rows]
+    files["check_points"].write_text("\n".join([head, *lines, lines[2].replace("check", "fit")]))
+    result = groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
+    summary = result.summary()
+    assert (summary["points"], summary["points_without_height"]) == (2, 1)
+    assert any(re.match("points left out, as the height .*: 1", line) for line in result.lines())
+    files["check_points"].write_text("\n".join([head, lines[2]]))
+    with pytest.raises(
+        TooFewPointsError, match=r"that are used: points left out, as the height .*: 1"
+    ):
+        groundtie.assess_sensor(**files, dem=dem, dem_datum="ellipsoidal")
 
 
 def test_without_points_nothing_is_judged(files: dict[str, Path], tmp_path: Path) -> None:

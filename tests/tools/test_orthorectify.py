@@ -109,6 +109,26 @@ def test_a_wall_amid_the_image_does_not_tell_the_pixel_size(
     assert result.grid.pixel_size_m == pytest.approx(1.0, rel=0.005)
 
 
+def test_the_grid_covers_a_narrow_hill_at_the_border(tmp_path: Path) -> None:
+    rpc = camera_rpc(pixel_m=5.0, turn_deg=0.0)
+    image = write_positions(tmp_path / "image.tif", rpc)
+    # 250 m high and 50 m wide; by its height, the border lies 60 m further west.
+    hill = rpc.localise([[0.0, 249.5]], 250.0)[0]
+    step = 10 / 111_195.0
+    corner = np.array([9.0, 45.15]) + [-420 * step, 300 * step]
+    grid = Grid(Affine(1.4 * step, 0, corner[0], 0, -step, corner[1]), LON_LAT, 600, 600)
+    places = grid.pixel_to_map(np.stack(np.meshgrid(*2 * [np.arange(600)]), -1).reshape(-1, 2))
+    east, north = ((places - hill) * [78_600.0, 111_195.0]).T
+    heights = 100 + 250 * np.exp(-((east / 200) ** 2) - (north / 35) ** 2)
+    dem = write_raster(tmp_path / "dem.tif", heights.reshape(600, 600).astype(np.float32), grid)
+    output = tmp_path / "ortho.tif"
+    own = groundtie.orthorectify(image, output, dem, dem_datum="ellipsoidal").grid
+    wider = own.window(-30, -30, own.width + 60, own.height + 60)
+    like = write_raster(tmp_path / "like.tif", np.zeros(wider.size[::-1], np.uint8), wider)
+    seen = np.isfinite(by_gdal({"image": image, "dem": dem}, like, "nearest")[0])
+    assert seen.sum() == seen[30:-30, 30:-30].sum() > 290_000
+
+
 @pytest.mark.parametrize(
     "stated",
     [

@@ -345,6 +345,19 @@ def test_points_outside_of_the_image_count(tmp_path: Path) -> None:
     assert error_px(read_rpc(tmp_path / "refined.RPB")) < 0.35
 
 
+def test_points_where_no_height_is_known_are_counted(tmp_path: Path) -> None:
+    files = write_points(tmp_path, bias_of("shift"))
+    head, *rows = files["gcps"].read_text().splitlines()
+    # Three points lie a degree off the terrain model, and state no height.
+    for i in range(3):
+        lon, lat, col, row, _, *more = rows[i].split(",")
+        rows[i] = ",".join([str(float(lon) + 1), lat, col, row, "", *more])
+    files["gcps"].write_text("\n".join([head, *rows]))
+    result = groundtie.refine_rpc(output=tmp_path / "refined.RPB", dem_datum="ellipsoidal", **files)
+    assert result.verdict.fit_points == 37
+    assert any(line.startswith("points left out") and "3" in line for line in result.lines())
+
+
 def test_heights_that_contradict_the_terrain_model_are_told(tmp_path: Path) -> None:
     """The points have heights above the ellipsoid, the terrain model as said, too."""
     files = write_points(tmp_path, bias_of("shift"))

@@ -56,6 +56,8 @@ class RasterSurface:
         Which of the reduced pixels are not in a void left unfilled.
     margin_px
         Distance beyond the outermost pixels' centres at which their values still hold.
+    fills_open
+        Whether voids that are open to the region's edge, or lie beyond it, are filled.
     """
 
     source: RasterSource
@@ -65,6 +67,7 @@ class RasterSurface:
     valid: Mask
     known: Mask
     margin_px: float = _HALF_PX
+    fills_open: bool = True
 
     def at(self, positions: FloatArray) -> FloatArray:
         """Return the values, shape (n,), at positions, (n, 2); NaN where there are none."""
@@ -97,7 +100,11 @@ class RasterSurface:
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
         x, y = self._reduced(cols, rows)
         values = interpolate(self.filled, np.stack([x, y])[:, None], "bilinear")[0]
-        values[~self.known[self._nearest(x, y)]] = np.nan
+        known = self.known[self._nearest(x, y)]
+        if not self.fills_open:
+            col, row, width, height = self.region
+            known &= (cols >= col) & (cols < col + width) & (rows >= row) & (rows < row + height)
+        values[~known] = np.nan
         return values
 
     def _reduced(self, cols: NDArray[Any], rows: NDArray[Any]) -> tuple[FloatArray, FloatArray]:
@@ -207,7 +214,8 @@ def surface_around(
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
     known = np.ones_like(valid) if fill_open else valid | _are_enclosed(valid)
-    return RasterSurface(source, to_px, window, fill_voids(values, valid), valid, known)
+    filled = fill_voids(values, valid)
+    return RasterSurface(source, to_px, window, filled, valid, known, fills_open=fill_open)
 
 
 def _are_enclosed(valid: Mask) -> Mask:

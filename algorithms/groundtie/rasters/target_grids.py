@@ -93,7 +93,7 @@ def registered_grid(
     px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None = None,
-    smooth: PointFunction | None = None,
+    footprint: FloatArray | None = None,
 ) -> Grid:
     """Return a grid that covers all of a registered raster.
 
@@ -111,9 +111,8 @@ def registered_grid(
         CRS of the result.
     pixel_size_m
         Pixel size in metres (in pixels without georeferencing).
-    smooth
-        Approximation of `px_to_map` without terrain, which determines the pixel size; None:
-        `px_to_map` itself.
+    footprint
+        Map positions, shape (n, 2), that the result covers; None: those of the input's outline.
 
     Raises
     ------
@@ -123,8 +122,9 @@ def registered_grid(
         The transform stretches the raster excessively, or there are too many pixels, or a pixel is
         larger than the whole raster.
     """
-    smooth = smooth or px_to_map
-    usual = _registered_grid(input_grid, px_to_map, crs, None, smooth)
+    if footprint is None:
+        footprint = px_to_map(input_grid.outline())
+    usual = _registered_grid(input_grid, px_to_map, crs, None, footprint)
     stretch = np.hypot(*usual.size) / np.hypot(*input_grid.size)
     if stretch > _LARGEST_STRETCH:
         raise GridSizeError(
@@ -135,7 +135,7 @@ def registered_grid(
         return usual
     if pixel_size_m > np.max(np.multiply(usual.pixel_sides_m, usual.size)):
         raise GridSizeError(f"a pixel size of {pixel_size_m:.6g} is larger than the whole raster")
-    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m, smooth)
+    return _registered_grid(input_grid, px_to_map, crs, pixel_size_m, footprint)
 
 
 def _registered_grid(
@@ -143,15 +143,14 @@ def _registered_grid(
     px_to_map: PointFunction,
     crs: CRS | None,
     pixel_size_m: float | None,
-    smooth: PointFunction,
+    footprint: FloatArray,
 ) -> Grid:
-    footprint = px_to_map(input_grid.outline())
     if pixel_size_m is None and crs == input_grid.crs:
         return covering_grid(input_grid, footprint)
     if not input_grid.is_georeferenced and crs is None:
         return covering_grid(input_grid.scaled(pixel_size_m or 1.0), footprint)
     col, row = input_grid.centre_px
-    corners = smooth(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
+    corners = px_to_map(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) + [col, row])
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")

@@ -12,6 +12,10 @@ from ..rasters.target_grids import covering_grid, registered_grid
 from ..sensor.dense import DenseOrientation
 from .sensor_input import OrientedImage
 
+# Most places along a side of an image at which its border is projected: more than a sensor's line
+# has pixels, but few enough that a file of a few bytes cannot exhaust the memory.
+_MOST_ALONG = 100_000
+
 
 def write_orthoimage(
     image: OrientedImage,
@@ -47,9 +51,12 @@ def write_orthoimage(
     if grid is None:
         # Georeferencing other than the RPCs is ignored.
         pixels = source.grid.on_own_pixels()
+        # Relief may displace any pixel of the border outwards.
+        border = pixels.outline(min(max(pixels.size), _MOST_ALONG))
         # A wall or a steep slope must not determine the pixel size.
-        smooth = by.to_level_map
-        grid = registered_grid(pixels, by.to_nominal_map, by.crs, pixel_size, smooth)
+        grid = registered_grid(
+            pixels, by.to_level_map, by.crs, pixel_size, by.to_nominal_map(border)
+        )
     else:
         middle = grid.pixel_to_map([grid.centre_px])[0, 0]
         outline = near_longitude(by.to_nominal_map(source.grid.outline()), middle, by.crs)

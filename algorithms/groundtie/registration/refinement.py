@@ -21,7 +21,7 @@ from ..masks.used import MaskUsed
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
 from ..sensor.adjustment import Adjustment, Control, adjust, reach_px
 from ..sensor.bias import SHIFT, fold
-from ..sensor.control_points import ControlPoints
+from ..sensor.control_points import ControlPoints, left_out
 from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.heights import ConstantHeight, Heights
 from ..sensor.orientation import sensor_grid
@@ -291,6 +291,7 @@ class RefinedRpc:
         verdict, evidence, bias = self.verdict, self.evidence, self.adjustment.bias
         shift, sigma = bias.shift_px()
         by_hand = self.points.by_hand
+        lost = int(self.points.without_height.sum())
         return [
             *self.tried,
             f"accepted: {verdict.reason}",
@@ -302,6 +303,7 @@ class RefinedRpc:
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
             *([f"set by hand: {by_hand} points"] if by_hand else []),
+            *([left_out(lost)] if lost else []),
             self.ground,
             *(() if self.mask is None else (self.mask.line(),)),
             *(f"warning: {line}" for line in self.heights.warnings()),

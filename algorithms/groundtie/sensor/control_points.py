@@ -33,6 +33,8 @@ CORRELATION = "sigma_correlation"
 # Standard deviation, in pixels, of points that state none.
 _USUAL_SIGMA_PX = 1.0
 
+_NO_HEIGHT = "no height"
+
 # Options for `gdal_translate --optfile`.
 GDAL_SUFFIX = ".txt"
 SUFFIXES = (*TIE_POINT_SUFFIXES, GDAL_SUFFIX)
@@ -58,13 +60,18 @@ class ControlPoints(TiePoints):
     def of(cls, points: TiePoints, height_m: FloatArray, crs: CRS) -> ControlPoints:
         """Return points on a map with heights, shape (n,); those of unknown height are rejected."""
         is_known = np.isfinite(height_m)
-        known = vars(points.reject(~is_known, "no height"))
+        known = vars(points.reject(~is_known, _NO_HEIGHT))
         return cls(**{**known, "crs": crs, "height_m": np.where(is_known, height_m, 0.0)})
 
     @property
     def by_hand(self) -> int:
         """Number of points that a person moved or added."""
         return int(self.edited.sum())
+
+    @property
+    def without_height(self) -> NDArray[np.bool_]:
+        """Which points are rejected as the height of the ground is not known there, (n,)."""
+        return np.asarray(self.state == f"rejected: {_NO_HEIGHT}")
 
     @property
     def lon_lat(self) -> FloatArray:
@@ -147,6 +154,11 @@ def _word(crs: CRS) -> str:
     name = crs_name(crs)
     # GDAL quotes and escapes as JSON does.
     return json.dumps(name, ensure_ascii=False) if '"' in name else name
+
+
+def left_out(count: int) -> str:
+    """Return in words how many points are left out for want of a height."""
+    return f"points left out, as the height of the ground is not known there: {count}"
 
 
 def read_control_points(

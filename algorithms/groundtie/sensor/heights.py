@@ -18,6 +18,7 @@ from ..rasters.grid import (
     FloatArray,
     Grid,
     PointFunction,
+    full_turn,
     near_longitude,
 )
 from ..rasters.height_surfaces import RasterSurface, SurfacePiece, surface_around
@@ -107,7 +108,7 @@ class TerrainHeights:
         """Return heights in metres, shape (n,), at longitudes and latitudes; NaN if unknown."""
         heights = self.terrain.at(lon_lat)
         if self.geoid is not None:
-            heights = heights + self.geoid.at(lon_lat)
+            heights = heights + _undulation_m(self.geoid, lon_lat)
         return heights
 
     def on_grid(self, grid: Grid, on_nodes: OnNodes) -> HeightsOnGrid | None:
@@ -116,7 +117,7 @@ class TerrainHeights:
         geoid = None
         if self.geoid is not None:
             surface = self.geoid
-            geoid = on_nodes(lambda lon_lat: surface.at(lon_lat)[:, None], _TOLERANCE_M)
+            geoid = on_nodes(lambda lon_lat: _undulation_m(surface, lon_lat)[:, None], _TOLERANCE_M)
         known = place.values[:, np.isfinite(place.values).all(axis=0)].T
         if not len(known) or (geoid is not None and np.isnan(geoid.values).all()):
             return None
@@ -209,6 +210,25 @@ def terrain_heights(
         raise type(error)(f"the geoid cannot be used: {error}") from error
 
 
+def _undulation_m(geoid: RasterSurface, lon_lat: FloatArray) -> FloatArray:
+    """Return the heights of a geoid, shape (n,); global ones continue from the last column."""
+    values = geoid.at(lon_lat)
+    grid = geoid.source.grid
+    turn = full_turn(grid.crs)
+    if turn is None:
+        return values
+    col = geoid.to_px(lon_lat)[:, 0]
+    beyond = col - np.clip(col, 0, grid.width - 1)
+    gap = np.flatnonzero(np.isfinite(values) & (beyond != 0))
+    if gap.size:
+        # The gap is as wide as a pixel; its other side is the column at the grid's other end.
+        share = np.abs(beyond[gap])
+        step_deg = np.sign(beyond[gap]) * (1 - share) * grid.pixel_size[0] * 360 / turn
+        across = geoid.at(lon_lat[gap] + np.outer(step_deg, [1.0, 0.0]))
+        values[gap] += np.where(np.isfinite(across), share * (across - values[gap]), 0.0)
+    return values
+
+
 def require_crs(source: RasterSource) -> CRS:
     """Return a raster's CRS, which relates it to the longitudes and latitudes of RPCs.
 
@@ -251,4 +271,14 @@ def surface_over(source: RasterSource, lon_lat: FloatArray) -> RasterSurface:
     surface = surface_around(source, exact, lon_lat, fill_open=False)
     around = 0.05 * (opposite - corner) + 1e-4
     fast = smooth_map(exact, corner - around, opposite + around, POSITION_ERROR_PX)
-    return replace(surface, to_px=lambda places: fast(near_longitude(places, middle, LON_LAT)))
+
+    def to_px(places: FloatArray) -> FloatArray:
+        places = near_longitude(places, middle, LON_LAT)
+        px = fast(places)
+        # Ground control may lie beyond the region, above all if the RPCs are wrong.
+        beyond = np.isnan(px[:, 0]) & np.isfinite(places).all(axis=1)
+        if beyond.any():
+            px[beyond] = exact(places[beyond])
+        return px
+
+    return replace(surface, to_px=to_px)

@@ -15,7 +15,7 @@ from ..kinds import GEOTIFF, FileIn, FileOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
 from ..registration.sensor_input import Ground, open_oriented_image, open_sensor_image
-from ..sensor.control_points import READ_SUFFIXES, read_control_points
+from ..sensor.control_points import READ_SUFFIXES, left_out, read_control_points
 from ..sensor.rpc import RPC
 from ..sensor.rpc_files import read_rpc
 from .parameters import general, sensor
@@ -35,20 +35,30 @@ class SensorAssessment:
         Number of points.
     files
         What was written, by name.
+    without_height
+        Number of points that are left out, as the height of the ground is not known there.
     """
 
     errors: dict[str, SensorErrors]
     points: int
     files: dict[str, str]
+    without_height: int = 0
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
         measured = {name: errors.summary() for name, errors in self.errors.items()}
-        return {"points": self.points, AFTER: None, **measured, "files": self.files}
+        return {
+            "points": self.points,
+            "points_without_height": self.without_height,
+            AFTER: None,
+            **measured,
+            "files": self.files,
+        }
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        return [*table_lines(self.errors), *file_lines(self.files)]
+        lost = [left_out(self.without_height)] if self.without_height else []
+        return [*table_lines(self.errors), *lost, *file_lines(self.files)]
 
 
 @tool(
@@ -104,8 +114,12 @@ def assess_sensor(
         points = read_control_points(
             check_points, oriented.orientation, oriented.source.grid, oriented.source.path
         )
+        lost = points.without_height
         if not points.used.any():
-            raise TooFewPointsError(f"{check_points} holds no points that are used")
+            why = f": {left_out(int(lost.sum()))}" if lost.any() else ""
+            raise TooFewPointsError(f"{check_points} holds no points that are used{why}")
+        if points.states_fit or points.check.any():
+            lost &= points.is_check
         points = points.take(points.independent)
         if len(points) == 0:
             raise TooFewPointsError(f"{check_points}: {NONE_HELD_OUT}")
@@ -117,7 +131,8 @@ def assess_sensor(
                 write_table(outputs.stage(table), points, errors)
             if picture is not None:
                 draw_vectors(outputs.stage(picture), points, errors, oriented.source.grid.size)
-    return SensorAssessment(errors, len(points), given_files({"table": table, "picture": picture}))
+    files = given_files({"table": table, "picture": picture})
+    return SensorAssessment(errors, len(points), files, int(lost.sum()))
 
 
 def _refined(path: Path, stack: ExitStack) -> RPC:
