@@ -55,11 +55,12 @@ def by_gdal(files: dict[str, Path], like: Path, resampling: str) -> np.ndarray:
 @pytest.mark.parametrize("origin", [(0, 0), (300, 200)])
 def test_a_piece_of_an_image_is_named(files: dict[str, Path], origin: tuple[int, int]) -> None:
     """As rasterio writes a window, with the RPCs of the whole image."""
-    with rasterio.open(files["image"], "r+") as image:
-        image.transform = Affine.translation(*origin)
+    if origin != (0, 0):
+        with rasterio.open(files["image"], "r+") as image:
+            image.transform = Affine.translation(*origin)
     result = groundtie.orthorectify(**files, dem_datum="ellipsoidal")
-    warned = "counts its pixels from 300, 200" in "\n".join(result.lines())
-    assert warned == (origin != (0, 0))
+    warned = re.findall("counts its pixels from ([0-9, .-]+)", "\n".join(result.lines()))
+    assert warned == ([] if origin == (0, 0) else ["300, 200, "])
 
 
 @pytest.mark.slow

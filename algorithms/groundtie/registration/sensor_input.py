@@ -130,7 +130,8 @@ def _piece_note(grid: Grid) -> str:
     A piece that was cut from an image does so, as rasterio writes it. GDAL would ignore it, too.
     """
     a, b, col, d, e, row = grid.transform[:6]
-    if grid.crs is not None or (a, b, d, abs(e)) != (1, 0, 0, 1) or (col, row) == (0, 0):
+    is_piece = (a, b, d, e) == (1, 0, 0, 1) and (col, row) != (0, 0)
+    if grid.crs is not None or not grid.is_georeferenced or not is_piece:
         return ""
     return (
         f"; the image counts its pixels from {col:g}, {row:g}, as a piece of a larger image does: "
