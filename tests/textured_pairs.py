@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import rasterio
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from raster_files import utm_grid, write_raster
 from scipy.ndimage import gaussian_filter, map_coordinates
 
@@ -59,6 +59,28 @@ class TexturedPair:
     def opened(self) -> Iterator[ImagePair]:
         with open_raster(self.reference) as reference, open_raster(self.input) as input:
             yield make_pair(Image(reference), Image(input))
+
+
+@dataclass(frozen=True)
+class HoledGrid(Grid):
+    """A grid some of whose map has no pixels, as ground of unknown height in an image with RPCs."""
+
+    hole_xy: tuple[float, float] = (0.0, 0.0)
+    radius: float = 40.0
+
+    def map_to_pixel(self, xy: ArrayLike) -> FloatArray:
+        """Return pixel positions; NaN in the hole."""
+        px = super().map_to_pixel(xy)
+        px[np.hypot(*(np.asarray(xy, float) - self.hole_xy).T) < self.radius] = np.nan
+        return px
+
+
+def with_hole_around(pair: ImagePair, px: ArrayLike) -> ImagePair:
+    """Return a pair of `textured` whose input has a hole where a matching pixel's match lies."""
+    x, y = pair.grid.pixel_to_map([px])[0]
+    grid = pair.input.source.grid
+    holed = HoledGrid(grid.transform, grid.crs, grid.width, grid.height, (x + 70.0, y - 45.0))
+    return replace(pair, input=replace(pair.input, source=replace(pair.input.source, grid=holed)))
 
 
 def write_textured_pair(

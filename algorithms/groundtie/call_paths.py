@@ -82,7 +82,9 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
             own = f"a file of {name}"
             other = taken.setdefault(more.resolve(), own)
             if other != own:
-                raise SameFileError(f"{name} would also write {more}, which is {other}")
+                raise SameFileError(
+                    f"{name} would also write {more}, which is {other}: give {name} another name"
+                )
             if isinstance(kind, FileOut):
                 check_numbers(name, more)
 

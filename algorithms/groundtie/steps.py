@@ -174,6 +174,7 @@ def match_chips(
         places = stages.matcher.fit_places(stages.held_out.layout)
         surfaces = stages.matcher.match(model, places, radius_px, running)
         points = check_points(stages.masked.pair, surfaces, model)
+        points = points.take(points.located)
         return replace(points, is_check=np.zeros(len(points), bool))
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from raster_files import write_raster
-from textured_pairs import TexturedPair, rms, shift_on_map
+from textured_pairs import TexturedPair, rms, shift_on_map, with_hole_around
 
 from groundtie.context import Context
 from groundtie.geometry.models import Model
@@ -47,6 +47,18 @@ def test_check_surfaces_are_those_of_the_check_points(pair: ImagePair, context: 
     assert np.abs(np.array(np.unravel_index(peaks, (side, side))) - side // 2).max() <= 1
     np.testing.assert_allclose(surfaces.max(axis=(1, 2)), check.points.score[:2], rtol=1e-5)
     assert len(check.surfaces) == len(check.points)
+
+
+def test_a_check_chip_without_a_place_in_the_input_is_none(
+    pair: ImagePair, context: Context
+) -> None:
+    """As in an image with RPCs, where the ground's height is not known."""
+    model = shift_on_map(70.0, -45.0)
+    holed = with_hole_around(pair, HeldOut.of(pair).layout.check_centres[0])
+    check = checked(holed, model, context)
+    assert np.isfinite(check.points.input_px).all()
+    assert len(check.surfaces) == len(check.points)
+    assert len(check.points) == len(checked(pair, model, context).points) - 1
 
 
 def test_few_check_chips_with_content(

@@ -6,7 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from raster_files import write_raster
-from textured_pairs import TexturedPair, everywhere, rms, shift_on_map, write_textured_pair
+from textured_pairs import (
+    TexturedPair,
+    everywhere,
+    rms,
+    shift_on_map,
+    with_hole_around,
+    write_textured_pair,
+)
 
 from groundtie.context import Context
 from groundtie.errors import TooFewPointsError
@@ -119,6 +126,17 @@ def test_the_model_reaches_the_input_through_its_own_georeferencing(
     right = estimate.points.take(estimate.points.used)
     assert rms(right.input_px - files.truth(right.reference_xy)) < 0.5
     assert rms(right.residual_px(estimate.transform)) < 0.5
+
+
+def test_a_match_without_a_place_in_the_input_spoils_no_other(
+    textured: TexturedPair, pair: ImagePair, context: Context
+) -> None:
+    """As in an image with RPCs, where the ground's height is not known."""
+    holed = with_hole_around(pair, fit_of(pair).layout.fit_centres[0])
+    estimate = fit_of(holed).estimate(COARSE, "translation", context)
+    assert error_px(estimate.transform.model, textured) < 0.2
+    assert np.isfinite(estimate.points.input_px).all()
+    assert estimate.points.used.sum() > 0.8 * len(fit_of(pair).layout.fit_centres)
 
 
 @pytest.mark.slow

@@ -56,6 +56,16 @@ def test_the_verdict_comes_first(page: Page) -> None:
     assert "18 % of the overlap lies outside" in page.text
 
 
+@pytest.mark.parametrize(("ce90_px", "said"), [(0.6, "larger"), (3.0, "smaller")])
+def test_how_residuals_compare_with_the_accuracy(
+    pair: ImagePair, tmp_path: Path, ce90_px: float, said: str
+) -> None:
+    """Nine tenths of residuals of 0.61 px (RMSE) are within 0.93 px."""
+    accuracy = replace(ACCEPTED.accuracy, ce90_px=ce90_px)
+    page = written(refused(pair, verdict=replace(ACCEPTED, accuracy=accuracy)), tmp_path)
+    assert re.findall("Residuals of check points are ([a-z]+)", page.text) == [said]
+
+
 def test_a_covered_overlap_is_not_said_to_be_extrapolated(pair: ImagePair, tmp_path: Path) -> None:
     verdict = replace(ACCEPTED, extrapolated_share=0.0)
     page = written(refused(pair, verdict=verdict), tmp_path)

@@ -52,6 +52,17 @@ def by_gdal(files: dict[str, Path], like: Path, resampling: str) -> np.ndarray:
     return out
 
 
+@pytest.mark.parametrize("origin", [(0, 0), (300, 200)])
+def test_a_piece_of_an_image_is_named(files: dict[str, Path], origin: tuple[int, int]) -> None:
+    """As rasterio writes a window, with the RPCs of the whole image."""
+    if origin != (0, 0):
+        with rasterio.open(files["image"], "r+") as image:
+            image.transform = Affine.translation(*origin)
+    result = groundtie.orthorectify(**files, dem_datum="ellipsoidal")
+    warned = re.findall("counts its pixels from ([0-9, .-]+)", "\n".join(result.lines()))
+    assert warned == ([] if origin == (0, 0) else ["300, 200, "])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("resampling", ["bilinear", "cubic"])
 def test_positions_are_those_of_gdal(files: dict[str, Path], resampling: str) -> None:

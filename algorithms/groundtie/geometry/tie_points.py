@@ -90,6 +90,14 @@ class TiePoints(Rows):
         return self.check if self.states_fit or self.check.any() else self.used
 
     @property
+    def located(self) -> NDArray[np.bool_]:
+        """Which points have a place in the input, shape (n,).
+
+        An image with RPCs has none where the height of the ground is not known.
+        """
+        return np.asarray(np.isfinite(self.input_px).all(axis=1))
+
+    @property
     def edited(self) -> NDArray[np.bool_]:
         """Which points a person moved, added or drew, shape (n,)."""
         return np.asarray(self.more.get(EDITED, np.zeros(len(self))) > 0)

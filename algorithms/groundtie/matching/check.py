@@ -57,4 +57,4 @@ def check_model(
     matched = matcher.seeing_all().match(model, places, CHECK_RADIUS_PX, context)
     surfaces = matcher.for_check(matched, layout)
     points = check_points(matcher.pair, surfaces, model)
-    return Check(points, surfaces.combined)
+    return Check(points.take(points.located), surfaces.combined[points.located])

@@ -148,6 +148,7 @@ def fit_points(
         return [find_peak_near(surface, shift, _NEAR_PX) for surface, shift in pairs]
 
     points = _tie_points(pair, surfaces, model, peaks, is_check=False)
+    points = points.take(points.located)
     limit = f"forward–backward error above {TOLERANCE_PX:g} px"
     return points.reject(points.forward_backward_error_px > TOLERANCE_PX, limit)
 

@@ -69,12 +69,12 @@ def plan(scene: SceneInfo, is_georeferenced: bool) -> tuple[Try, ...]:
     if scene.apparent is Sensors.DIFFERENT:
         tries = [replace(chips, because="a radar image and a camera's match by chips")]
     elif scene.apparent is Sensors.RADARS:
-        because = "both images are a radar's, which share keypoints"
+        because = "both images look like a radar's"
         tries = [Try("match_sar_sar", SAR_SAR, because), chips]
     else:
         # Not declared to be cameras': an image without speckle may still be a radar's.
         spec = replace(OPTICAL, radar=COREGISTER.radar)
-        because = "both images are a camera's, which share keypoints"
+        because = "neither image looks like a radar's"
         tries = [Try("match_optical", spec, because), chips]
     first = tries[0]
     if is_georeferenced:

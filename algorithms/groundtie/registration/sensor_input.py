@@ -11,6 +11,7 @@ from rasterio.crs import CRS
 
 from ..errors import NoOverlapError, ParameterError
 from ..progress import Progress
+from ..rasters.grid import Grid
 from ..rasters.reading import RasterSource, open_raster
 from ..sensor.geoids import DATUMS, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
@@ -118,9 +119,24 @@ class Ground:
                 f"{self.dem} covers only {_percent(found.known_share)} of the area of "
                 f"{source.path}, less than {_percent(self.least_cover)}"
             )
-        heights = self._note(found)
+        heights = self._note(found) + _piece_note(source.grid)
         progress.update(0.0, heights)
         return OrientedImage(source, found, heights)
+
+
+def _piece_note(grid: Grid) -> str:
+    """Return a warning if an image counts its pixels from elsewhere than its own corner.
+
+    A piece that was cut from an image does so, as rasterio writes it. GDAL would ignore it, too.
+    """
+    a, b, col, d, e, row = grid.transform[:6]
+    is_piece = (a, b, d, e) == (1, 0, 0, 1) and (col, row) != (0, 0)
+    if grid.crs is not None or not grid.is_georeferenced or not is_piece:
+        return ""
+    return (
+        f"; the image counts its pixels from {col:g}, {row:g}, as a piece of a larger image does: "
+        "its RPCs must be those of the piece"
+    )
 
 
 def _percent(share: float) -> str:

@@ -50,7 +50,7 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
         f"fewer than {FEWEST_CHECK_POINTS} held-out points agree, or their agreement has a "
         f"probability by chance above 10^{LARGEST_LOG10_CHANCE:.0f}",
         "[Moisan2004]; suites crossings, city and attacks",
-        "give a larger part of the scene, or more points that take no part in the fit",
+        "give a larger part of the scene or, with points of your own, more check points",
         _by_chance,
     ),
     Rule(

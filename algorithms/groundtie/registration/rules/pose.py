@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .rule import WIDER, Rule
+from .rule import Rule
 
 if TYPE_CHECKING:
     from ..pose_verdict import PoseEvidence
@@ -51,7 +51,7 @@ POSE_RULES: tuple[Rule, ...] = (
         f"the best rotation, scale and shift are less than {_LEAST_HEIGHT:g} robust standard "
         "deviations above chance",
         "suite rotated_pairs",
-        WIDER,
+        "check the band and the overlap; give wider limits of rotation, scale and shift",
         _no_pose,
     ),
     Rule(

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-WIDER = "check the band and the overlap; give a larger search radius, or allow rotation"
 ON_GROUND = "give a mask of the ground, such as roads and waters"
 WITHOUT = "give images, or masks, without what is drawn over the ground"
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from ...errors import AmbiguousPlaceError, GroundTieError, NothingFoundError, TooFewPointsError
 from ..evidence import SearchEvidence
-from .rule import WIDER, Rule
+from .rule import Rule
 
 
 def _ended_with(kind: type[GroundTieError]) -> Callable[[SearchEvidence], str | None]:
@@ -32,7 +32,8 @@ SEARCH_RULES: tuple[Rule, ...] = (
         "no place matches better than random images would, or keypoints agree on a second "
         "transform, as keypoints of the ground and of elevated objects do",
         "expected false alarms above 1; [Moisan2004]",
-        f"{WIDER} (of images on maps: with coregister, match_sar_sar or match_optical)",
+        "check the band and the overlap; give a larger search radius, or allow rotation (where a "
+        "tool has neither: with coregister, match_sar_sar or match_optical)",
         _ended_with(NothingFoundError),
     ),
     Rule(
