@@ -17,7 +17,7 @@ import rasterio
 import scipy
 
 from ..call_paths import check_numbers
-from ..geometry.judging import TOLERANCE_PX
+from ..geometry.judging import TOLERANCE_PX, ce90_of_rmse
 from ..kinds import REPORT_FORMAT, plain
 from ..rasters.atomic import Outputs, write_json, writing
 from ..runs import RUN, run_tags
@@ -120,7 +120,9 @@ def _environment() -> Any:
         lstrip_blocks=True,
     )
     environment.globals.update(colours=_COLOURS, tolerance_px=TOLERANCE_PX)
-    environment.filters.update(number=_number, percent=_percent, sentence=_sentence)
+    environment.filters.update(
+        number=_number, percent=_percent, sentence=_sentence, ce90=ce90_of_rmse
+    )
     environment.tests["finite"] = math.isfinite
     return environment
 
