@@ -71,10 +71,15 @@ class Colours:
             darkest,
         )
 
-    def classes(self, bands: FloatImage) -> FloatImage:
-        """Return the numbers of the classes, from 1, of bands (bands, h, w); shape (h, w)."""
+    def measured(self, bands: FloatImage) -> FloatImage:
+        """Return the brightness, and the component of colour, of bands (bands, h, w): (2, h, w)."""
         hue = np.einsum("b,b...->...", self.component, _hues(bands, self.darkest))
-        level = levels(bands.mean(axis=0), self.brightness_edges)
+        return np.stack([bands.mean(axis=0), hue])
+
+    def classes(self, measured: FloatImage) -> FloatImage:
+        """Return the numbers of the classes, from 1, by `measured`; shape (h, w)."""
+        brightness, hue = measured
+        level = levels(brightness, self.brightness_edges)
         return np.asarray(level * _HUES + levels(hue, self.hue_edges) + 1, np.float32)
 
     @property

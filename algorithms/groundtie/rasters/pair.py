@@ -78,8 +78,8 @@ class Image:
         """Return grey values, or classes of colour, on a grid, and where they are valid."""
         if self.colours is None:
             return sample(self.source, grid, to_px, "cubic", self.band)
-        bands, valid = sample_bands(self.source, grid, to_px)
-        return self.colours.classes(bands), valid
+        measured, valid = sample_bands(self.source, grid, to_px, self.colours.measured)
+        return self.colours.classes(measured), valid
 
     def read_onto(self, grid: Grid, to_px: PointFunction, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""

@@ -182,7 +182,9 @@ class RasterSource:
                 if self.is_complex:
                     values = np.abs(values)
                 one = len(bands) == 1
-                image = values[0].astype(np.float32) if one else values.mean(0, np.float32)
+                image = (
+                    values[0].astype(np.float32, copy=False) if one else values.mean(0, np.float32)
+                )
             known = np.asarray(valid.all(axis=0))
             # Integers are finite; a single band of single precision was checked when it was read.
             if self.dtype.kind in "fc" and not (one and self.dtype == np.float32):
@@ -199,7 +201,7 @@ class RasterSource:
             values, valid = average_window(grey, self, level, window, out_shape)
             # Sums of finite numbers may overflow.
             valid &= np.isfinite(values)
-        return np.where(valid, values, np.float32(0)).astype(np.float32), valid
+        return np.where(valid, values, np.float32(0)).astype(np.float32, copy=False), valid
 
     def read_bands(
         self,

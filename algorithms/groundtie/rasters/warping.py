@@ -78,7 +78,7 @@ def _resample(
 ) -> tuple[NDArray[Any], Mask]:
     """Return `resample` of an image whose bands are valid at the same pixels."""
     if method != "nearest" and valid.all() and are_inside(px, valid.shape, REACH[method]):
-        values = interpolate(image.astype(working_dtype(image.dtype)), px, method)
+        values = interpolate(image.astype(working_dtype(image.dtype), copy=False), px, method)
         return rounded(values, dtype), np.ones(px.shape[1:], bool)
     nearest = _nearest_pixels(px)
     known, whole = _validity(valid, nearest, REACH[method])
@@ -86,7 +86,8 @@ def _resample(
         cols, rows = np.where(known, nearest, 0).astype(np.intp)
         values = np.where(known, image[..., rows, cols], image.dtype.type(0))
         return rounded(values, dtype), known
-    filled = np.where(valid, image, image.dtype.type(0)).astype(working_dtype(image.dtype))
+    filled = np.where(valid, image, image.dtype.type(0))
+    filled = filled.astype(working_dtype(image.dtype), copy=False)
     values = interpolate(filled, px, method)
     partly = known & ~whole
     if partly.any():
@@ -220,9 +221,19 @@ def sample(
 
 
 def sample_bands(
-    source: RasterSource, grid: Grid, to_input_px: PointFunction
+    source: RasterSource,
+    grid: Grid,
+    to_input_px: PointFunction,
+    of_bands: Callable[[FloatImage], FloatImage] = lambda bands: bands,
 ) -> tuple[FloatImage, Mask]:
     """Resample all bands but alpha by "cubic", as `sample`; pixels must be valid in all bands.
+
+    Parameters
+    ----------
+    source, grid, to_input_px
+        As in `sample`.
+    of_bands
+        What is resampled in place of the bands, (bands, h, w): a function of them, pixel by pixel.
 
     Returns
     -------
@@ -234,7 +245,8 @@ def sample_bands(
         values, valid = source.read_bands(part, source.image_bands, out_shape)
         everywhere: Mask = np.asarray(valid.all(axis=0))
         values = np.abs(values) if source.is_complex else values
-        return np.where(everywhere, values, 0).astype(np.float32), everywhere
+        known = np.where(everywhere, values, 0).astype(np.float32, copy=False)
+        return of_bands(known), everywhere
 
     return sample_by(source, grid, to_input_px, "cubic", read)
 
