@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -166,3 +166,13 @@ def rewritten(pair: TexturedPair, folder: Path, **changed: Any) -> TexturedPair:
         values, more = new if isinstance(new, tuple) else (new, {})
         paths[name] = write_raster(folder / f"{name}.tif", values, **{"grid": grid, **more})
     return replace(pair, **paths)
+
+
+class _OfASensor(Grid):
+    """The pixels of an image in the geometry of its sensor."""
+
+
+def of_a_sensor(image: Image) -> Image:
+    """Return an image as one in the geometry of its sensor."""
+    own = _OfASensor(**{one.name: getattr(image.source.grid, one.name) for one in fields(Grid)})
+    return replace(image, source=replace(image.source, grid=own))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,7 +11,7 @@ import pytest
 from affine import Affine
 from evidences import VIEWS
 from raster_files import utm_grid, write_raster
-from textured_pairs import shift_on_map, texture
+from textured_pairs import of_a_sensor, shift_on_map, texture
 
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
@@ -19,7 +19,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.matching.locked import EXACT_PX, LockedContent, find_locked_content
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import survey_places
-from groundtie.rasters.grid import Grid, compose
+from groundtie.rasters.grid import compose
 from groundtie.rasters.pair import Image, ImagePair, make_pair
 from groundtie.rasters.reading import open_raster
 
@@ -421,15 +421,9 @@ def test_arrays_are_not_the_same_where_a_transform_has_them_elsewhere(
         assert locked is not None and not locked.shared.is_evident
 
 
-class OfASensor(Grid):
-    """The pixels of an image in sensor geometry."""
-
-
 def test_nothing_is_drawn_on_the_map_of_an_image_of_a_sensor(
     tmp_path: Path, context: Context
 ) -> None:
     with on_grids(tmp_path, sensed(1), sensed(1), utm_grid(SIDE, SIDE).transform) as pair:
-        source = pair.input.source
-        own = OfASensor(**{one.name: getattr(source.grid, one.name) for one in fields(Grid)})
-        image = replace(pair.input, source=replace(source, grid=own))
-        assert found_in(replace(pair, input=image), shift_on_map(3.0, 0.0), context) is None
+        pair = replace(pair, input=of_a_sensor(pair.input))
+        assert found_in(pair, shift_on_map(3.0, 0.0), context) is None

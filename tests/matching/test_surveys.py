@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from raster_files import utm_grid, write_raster
 from scipy import ndimage
-from textured_pairs import shift_on_map, texture
+from textured_pairs import of_a_sensor, shift_on_map, texture
 
 from groundtie.context import Context
 from groundtie.geometry.transform import Transform
@@ -65,8 +66,12 @@ def surveys_of(
     context: Context,
     offset: tuple[float, float] = (0.0, 0.0),
     sensors: Sensors = Sensors.CAMERAS,
+    is_of_a_sensor: bool = False,
 ) -> Surveys:
-    """Return the surveys of two arrays whose rows and columns are displaced by an offset."""
+    """Return the surveys of two arrays whose rows and columns are displaced by an offset.
+
+    The input may be in the geometry of its sensor.
+    """
     paths = [
         write_raster(
             folder / f"{name}.tif", (2000 + 200 * values).astype(np.uint16), utm_grid(SIDE, SIDE)
@@ -78,6 +83,8 @@ def surveys_of(
         # The grid has rows from north to south and pixels of 10 m.
         found = shift_on_map(10.0 * offset[0], -10.0 * offset[1])
         transform = Transform(found, pair.grid.crs, other.grid)
+        if is_of_a_sensor:
+            pair = replace(pair, input=of_a_sensor(pair.input))
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
         accuracy_px = ELSEWHERE_PX, EXACT_PX
@@ -106,6 +113,17 @@ def test_ground_shows_that_a_copy_was_blended_into(
     top = np.unravel_index(np.argmax(mean), mean.shape)
     assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(moved, abs=1)
     assert deviations_of_unexplained(surveys, ELSEWHERE_PX) > PEAK_DEVIATIONS
+
+
+@pytest.mark.parametrize("offset", [(6.0, -4.0), (6.4, -3.7)])
+def test_over_the_image_of_a_sensor_lies_no_map_layer(
+    offset: tuple[float, float], tmp_path: Path, context: Context
+) -> None:
+    """Only content of the array, which moves by whole pixels, may lie over its ground."""
+    copied = ndimage.shift(noisy(place(), 1), offset[::-1], mode="mirror")
+    images = noisy(place(), 1), 0.5 * copied + 0.5 * noisy(place((17, -11)), 2)
+    surveys = surveys_of(tmp_path, *images, context, offset, is_of_a_sensor=True)
+    assert (surveys.unexplained is not None) == (offset == (6.0, -4.0))
 
 
 @pytest.mark.slow

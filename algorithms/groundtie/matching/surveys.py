@@ -56,13 +56,14 @@ class Surveys:
     whole
         Of all content that takes part; None: no surveys were made at all.
     rest
-        Without the content that is identical in both arrays; None: it is not looked for.
+        Without the content that is identical in both arrays; None: it is not looked for, because
+        one image is rendered, or in the geometry of its sensor.
     ground
         Of open ground; None: not both are radar images, or open ground alone takes part.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
-        Of the part of the input that the reference does not explain; None: one image is rendered.
+        Of the part of the input that the reference does not explain; None: as `rest`.
     """
 
     whole: Survey | None = None
@@ -117,7 +118,8 @@ def survey_all(
     if sensors is not None:
         part = context.part(0.4, 0.9)
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, images, part)
-        unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
+        if rest is not None:  # else there is no map layer that the ground could lie beneath
+            unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
         ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground, images)

@@ -249,7 +249,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "the input, without what a line through the grey values of both images explains in windows "
         f"of {WINDOW_PX} px, correlates in phase with the reference at a second place: a peak of "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations more than {_ROOFS_PX:g} px off, or, "
-        f"for copies and views of one camera, of {PEAK_DEVIATIONS:g} nearer",
+        f"for copies and views of one camera, of {PEAK_DEVIATIONS:g} nearer. Not asked of an image "
+        "in the geometry of its sensor, over which no map layer lies",
         "[Kuglin1975]; suites margins, one_grid and attacks",
         WITHOUT,
         _unexplained_elsewhere,
