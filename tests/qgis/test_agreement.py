@@ -29,6 +29,7 @@ TYPES = {
     "Choice": "enum",
     "Flag": "boolean",
     "Text": "string",
+    "Views": "string",
     "Crs": "crs",
     "Band": "band",
 }
