@@ -299,13 +299,17 @@ class Views(Text):
 
     def files_named(self, value: str | None) -> tuple[Path, ...]:
         """Return the files among the views of a checked value."""
-        parts = (part.strip() for part in (value or "").split(";"))
-        return tuple(Path(part) for part in parts if is_view_file(part))
+        return tuple(Path(view) for view in views_in(value) if is_view_file(view))
 
     def located(self, value: str, folder: Path) -> str:
         """Return the views with relative paths of their files beginning at a folder."""
-        parts = (part.strip() for part in value.split(";"))
-        return "; ".join(str(folder / part) if is_view_file(part) else part for part in parts)
+        views = views_in(value)
+        return "; ".join(str(folder / view) if is_view_file(view) else view for view in views)
+
+
+def views_in(words: str | None) -> list[str]:
+    """Return the views in a text, the reference's first; empty where one is left out."""
+    return [view.strip() for view in (words or "").split(";")]
 
 
 def is_view_file(view: str) -> bool:

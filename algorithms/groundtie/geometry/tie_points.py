@@ -82,12 +82,17 @@ class TiePoints(Rows):
         return self.used & self.is_check
 
     @property
+    def has_roles(self) -> bool:
+        """Whether roles, of a fit or of check points, are stated."""
+        return self.states_fit or bool(self.check.any())
+
+    @property
     def independent(self) -> NDArray[np.bool_]:
         """Which points can serve as check points of a transform fitted to others, shape (n,).
 
         Points with the role check, or all used points if the file states no roles.
         """
-        return self.check if self.states_fit or self.check.any() else self.used
+        return self.check if self.has_roles else self.used
 
     @property
     def located(self) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
-from ..kinds import is_view_file
+from ..kinds import is_view_file, views_in
 from ..rasters.reading import open_raster
 from ..strict_json import read_json
 from .product_views import CAMERA, RADAR, metadata_beside, read_product_view
@@ -127,7 +127,7 @@ def split_views(words: str | None) -> tuple[str | None, str | None]:
     ParameterError
         More than two views are stated.
     """
-    parts = [part.strip() or None for part in (words or "").split(";")]
+    parts = [view or None for view in views_in(words)]
     if len(parts) > 2:
         raise ParameterError(f"{words!r} states {len(parts)} views; {_USAGE}")
     return parts[0], parts[1] if len(parts) > 1 else None

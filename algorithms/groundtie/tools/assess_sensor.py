@@ -118,7 +118,7 @@ def assess_sensor(
         if not points.used.any():
             why = f": {left_out(int(lost.sum()))}" if lost.any() else ""
             raise TooFewPointsError(f"{check_points} holds no points that are used{why}")
-        if points.states_fit or points.check.any():
+        if points.has_roles:
             lost &= points.is_check
         points = points.take(points.independent)
         if len(points) == 0:
