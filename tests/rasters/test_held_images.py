@@ -9,7 +9,7 @@ import pytest
 from raster_files import utm_grid, write_raster
 
 from groundtie.context import threads
-from groundtie.rasters.held_images import held_grey, held_on_level, held_onto
+from groundtie.rasters.held_images import HeldImage, held_grey, held_on_level
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 
@@ -37,27 +37,26 @@ def to_px(xy: np.ndarray) -> np.ndarray:
 def test_pieces_are_those_of_the_image(tmp_path: Path, nodata: float | None) -> None:
     original = image(tmp_path, nodata)
     with threads(2) as context:
-        held = held_onto(original, GRID.window(-20, -20, 600, 600), to_px, context)
+        held = HeldImage.onto(original, GRID.window(-20, -20, 600, 600), to_px, context)
     hidden = np.zeros((150, 180), bool)
     hidden[40:80, 60:100] = True
     for col, row in ((-20, -20), (150, 60), (333, 280)):
         piece = GRID.window(col, row, 180, 150)
         expected = original.read_onto(piece, to_px, hidden)
-        found = held.read_onto(piece, held.source.grid.map_to_pixel, hidden)
+        found = held.read(piece, hidden)
         np.testing.assert_array_equal(found.valid, expected.valid)
         np.testing.assert_allclose(found.values, expected.values, atol=0.02)
     assert not expected.valid.all()
+    beyond = held.read(GRID.window(500, 400, 180, 150))
+    np.testing.assert_array_equal(beyond.valid.any(axis=0), np.arange(180) < 80)
+    assert not held.read(GRID.window(-300, -300, 100, 150)).valid.any()
 
 
 @pytest.mark.parametrize(("nodata", "states"), [(0.0, True), (None, False)])
 def test_whoever_states_nothing_of_what_is_valid_does_not_seem_to(
     tmp_path: Path, nodata: float | None, states: bool
 ) -> None:
-    original = image(tmp_path, nodata)
-    with threads(1) as context:
-        held = held_onto(original, GRID, to_px, context)
-    assert held.source.says_what_is_valid is states
-    assert held_grey(original.source).says_what_is_valid is states
+    assert held_grey(image(tmp_path, nodata).source).says_what_is_valid is states
 
 
 def test_a_raster_reads_the_same_from_memory(tmp_path: Path) -> None:

@@ -102,17 +102,16 @@ def ground_between_buildings(level_db: FloatImage, valid: Mask, pixel_m: float) 
     level = cv2.blur(level_db, (_MEAN_PX, _MEAN_PX))
     darkest, brightest = np.percentile(level[valid], [_DARK_PERCENT, 100 - _BRIGHT_PERCENT])
     dark, bright = (level < darkest) & valid, (level > brightest) & valid
-    found = np.zeros(level.shape, np.float32)
-    with np.errstate(divide="ignore"):  # layover and shadow themselves lie 0 from themselves
-        for times, px in (
-            (2, distance_to_masked(~bright)),
-            (2, distance_to_masked(~dark)),
-            (1, distance_back_px(bright, azimuth_deg)),
-            (1, distance_back_px(dark, azimuth_deg + 180)),
-        ):
-            found += np.float32(times / 6) * np.log(np.minimum(px, np.float32(farthest_px)))
     least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
-    return np.asarray((found >= np.log(least_px)) & valid)
+    mean = np.ones(level.shape, np.float32)
+    for weight, px in (
+        (2, distance_to_masked(~bright)),
+        (2, distance_to_masked(~dark)),
+        (1, distance_back_px(bright, azimuth_deg)),
+        (1, distance_back_px(dark, azimuth_deg + 180)),
+    ):
+        mean *= np.minimum(px / np.float32(least_px), np.float32(farthest_px / least_px)) ** weight
+    return np.asarray((mean >= 1) & valid)
 
 
 def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:

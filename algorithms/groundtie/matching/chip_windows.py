@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..geometry.models import Model
 from ..rasters.grid import Grid, PointFunction
-from ..rasters.held_images import held_onto
+from ..rasters.held_images import HeldImage
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from .matcher import MaskOf, Places
@@ -54,13 +54,13 @@ class Resampled:
         The images.
     to_input
         Takes map positions, shape (n, 2), to pixels of the input.
-    is_held
-        Whether both images are held in memory, resampled on the grid of the chips.
+    held
+        Both images held in memory, resampled on the grid of the chips; None: they are read.
     """
 
     pair: ImagePair
     to_input: PointFunction
-    is_held: bool = False
+    held: tuple[HeldImage, HeldImage] | None = None
 
     @classmethod
     def by_model(
@@ -91,17 +91,20 @@ class Resampled:
             return cls(pair, to_input)
         around, quiet = grid.window(-reach_px, -reach_px, width, height), context.quiet()
         to_reference = pair.reference.source.grid.map_to_pixel
-        held = replace(
-            pair,
-            reference=held_onto(pair.reference, around, to_reference, quiet),
-            input=held_onto(pair.input, around, to_input, quiet),
+        held = (
+            HeldImage.onto(pair.reference, around, to_reference, quiet),
+            HeldImage.onto(pair.input, around, to_input, quiet),
         )
-        return cls(held, around.map_to_pixel, is_held=True)
+        return cls(pair, to_input, held)
 
     def read(self, piece: Grid, hidden: MaskOf | None = None) -> tuple[Patch, Patch]:
         """Return both images on a piece of the grid, with hidden reference pixels masked."""
-        reference = self.pair.reference_patch(piece, None if hidden is None else hidden(piece))
-        return reference, self.pair.input_patch(piece, self.to_input)
+        masked = None if hidden is None else hidden(piece)
+        if self.held is None:
+            reference = self.pair.reference_patch(piece, masked)
+            return reference, self.pair.input_patch(piece, self.to_input)
+        reference_held, input_held = self.held
+        return reference_held.read(piece, masked), input_held.read(piece)
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,8 @@ class ChipWindows:
         are processed.
         """
         chips = np.arange(len(self.places.centres))
-        held = self._read(chips) if self.images.is_held and len(chips) else None
+        is_held = self.images.held is not None
+        held = self._read(chips) if is_held and len(chips) else None
 
         def of_stack(piece: _Piece, stack: _Numbers) -> Iterable[tuple[int, R]]:
             windows = self._cut(piece, stack)
@@ -181,7 +185,7 @@ class ChipWindows:
 
         From files, fewer pixels are read that way; from memory, a block is a stack.
         """
-        if self.images.is_held:
+        if self.images.held is not None:
             yield from (chips[k : k + self._most] for k in range(0, len(chips), self._most))
             return
         if len(chips) == 0:

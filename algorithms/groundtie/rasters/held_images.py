@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from affine import Affine
+from numpy.typing import NDArray
 
 from ..arrays import Raster
 from ..context import Context
@@ -15,6 +17,7 @@ from .grid import Grid, PointFunction, compose
 from .handles import ArrayHandles, read_by
 from .metadata import BandInfo
 from .pair import Image, ImagePair
+from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
 from .warping import reduction
@@ -37,37 +40,52 @@ def held_grey(source: RasterSource, band: int | None = None) -> RasterSource:
     return _held(source, source.grid, *source.read(source.window, band))
 
 
-def held_onto(image: Image, grid: Grid, to_px: PointFunction, context: Context) -> Image:
-    """Return an image held in memory that reads the same as another on parts of a grid.
+@dataclass(frozen=True)
+class HeldImage:
+    """An image that is resampled on a grid and held in memory: 5 bytes per pixel, 6 with a mask.
 
     Parameters
     ----------
     image
         The image.
     grid
-        The grid, which becomes the grid of the held image.
-    to_px
-        Takes the grid's map positions to pixels of the image.
-    context
-        Threads and progress.
+        The grid.
+    values, valid
+        What `Image.values_onto` returns on it.
+    shown
+        What the image's mask keeps; None: there is no mask.
     """
-    shape = grid.height, grid.width
-    values, valid = np.empty(shape, np.float32), np.empty(shape, bool)
-    shown = None if image.mask is None else np.empty(shape, np.uint8)
 
-    def resample(tile: Window) -> None:
-        piece = grid.window(*tile)
-        values[tile.slices], valid[tile.slices] = image.values_onto(piece, to_px)
-        if shown is not None:
-            shown[tile.slices] = image.shown_on(piece, to_px)
+    image: Image
+    grid: Grid
+    values: FloatImage
+    valid: Mask
+    shown: Mask | None
 
-    for _ in context.map(resample, list(tiles(grid))):
-        pass
-    mask = None
-    if image.mask is not None and shown is not None:
-        mask = read_by(image.mask, ArrayHandles(Raster(shown)), BandInfo.plain("uint8"), grid)
-    source = _held(image.source, grid, values, valid)
-    return replace(image, source=source, band=1, mask=mask, mask_span=(1, 1), colours=None)
+    @classmethod
+    def onto(cls, image: Image, grid: Grid, to_px: PointFunction, context: Context) -> HeldImage:
+        """Resample an image on a grid; `to_px` takes map positions to pixels of the image."""
+        shape = grid.height, grid.width
+        values, valid = np.empty(shape, np.float32), np.empty(shape, bool)
+        shown = None if image.mask is None else np.empty(shape, bool)
+
+        def resample(tile: Window) -> None:
+            piece = grid.window(*tile)
+            values[tile.slices], valid[tile.slices] = image.values_onto(piece, to_px)
+            if shown is not None:
+                shown[tile.slices] = image.shown_on(piece, to_px)
+
+        for _ in context.map(resample, list(tiles(grid))):
+            pass
+        return cls(image, grid, values, valid, shown)
+
+    def read(self, piece: Grid, hidden: Mask | None = None) -> Patch:
+        """Return the image as `Image.read_onto`, on pixels of the grid; none is valid beyond it."""
+        col, row = np.rint(self.grid.map_to_pixel(piece.pixel_to_map([[0, 0]]))[0]).astype(int)
+        part = Window(int(col), int(row), *piece.size)
+        values, valid = _cut(self.values, part), _cut(self.valid, part)
+        shown = None if self.shown is None else _cut(self.shown, part)
+        return self.image.patch(values, valid, shown, hidden)
 
 
 def held_on_level(pair: ImagePair, level: Grid, context: Context) -> ImagePair:
@@ -119,3 +137,15 @@ def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> 
     # A raster without any declaration of validity must not seem to have one.
     nodata = float("nan") if source.says_what_is_valid else None
     return read_by(source, ArrayHandles(Raster(values)), BandInfo.plain("float32", nodata), grid)
+
+
+def _cut(array: NDArray[Any], part: Window) -> NDArray[Any]:
+    """Return a window of an array, 0 beyond it."""
+    whole = Window(0, 0, *array.shape[::-1])
+    inside = part.common(whole)
+    if inside == part:
+        return array[part.slices]
+    padded = np.zeros((part.height, part.width), array.dtype)
+    if min(inside.width, inside.height) > 0:
+        padded[inside.slices_in(part)] = array[inside.slices]
+    return padded

@@ -84,13 +84,29 @@ class Image:
     def read_onto(self, grid: Grid, to_px: PointFunction, hidden: Mask | None = None) -> Patch:
         """Return the image on a grid; `to_px` takes the grid's map positions to image pixels."""
         values, valid = self.values_onto(grid, to_px)
+        shown = None if self.mask is None else self.shown_on(grid, to_px)
+        return self.patch(values, valid, shown, hidden)
+
+    def patch(
+        self, values: FloatImage, valid: Mask, shown: Mask | None, hidden: Mask | None
+    ) -> Patch:
+        """Return values of the image as a patch of those that take part.
+
+        Parameters
+        ----------
+        values, valid
+            As from `values_onto`.
+        shown
+            What the image's mask keeps; None: there is no mask.
+        hidden
+            Pixels from whose values nothing may be inferred; None: there are none.
+        """
         if hidden is not None:
-            # First of all: nothing may be inferred from hidden values.
             values, valid = np.where(hidden, np.float32(0), values), valid & ~hidden
         if not self.source.says_what_is_valid:
             valid = valid & ~empty_areas(values, valid)
-        if self.mask is not None:
-            valid = valid & self.shown_on(grid, to_px)
+        if shown is not None:
+            valid = valid & shown
         return Patch(values, valid)
 
     def shown_on(self, grid: Grid, to_px: PointFunction) -> Mask:

@@ -59,6 +59,7 @@ def mask_pair(
     Parameters as `run`.
     """
     scene = scene or SceneInfo.of(opened.pair, spec.radar)
+    scene.prepare(context.quiet())
     if spec.surface is not None:
         return with_surface_mask(opened.pair, scene, spec.surface, opened.stack, context)
     if opened.user_mask is not None:

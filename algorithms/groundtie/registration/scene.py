@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from ..context import Context
 from ..kinds import AUTO
 from ..masks.ground import shows_ground
 from ..masks.open_ground import OpenGround
@@ -123,6 +124,18 @@ class SceneInfo:
             ImageFacts(getattr(pair, name), scene_of(pair, name)) for name in (REFERENCE, INPUT)
         )
         return cls(reference, input, declared, pair.is_ground_masked)
+
+    def prepare(self, context: Context) -> None:
+        """Find what every registration asks for, in both images side by side."""
+        # Python before 3.12 does not find one fact of two images at once, so facts take turns.
+        asked = (
+            (self.reference, "variation2"),
+            (self.input, "band_shifts"),
+            (self.input, "variation2"),
+            (self.reference, "band_shifts"),
+        )
+        for _ in context.map(lambda one: getattr(*one), asked):
+            pass
 
     @cached_property
     def radar_name(self) -> str:

