@@ -98,7 +98,8 @@ class ChipCase:
         most = self.most_chips * CHIPS_PX[0] // chip_px
         places = Places(grid, chip_centres(grid, chip_px, most), chip_px)
         started = time.perf_counter()
-        _, surfaces = matcher.match_forward(pair.nominal(), places, RADIUS_PX, context)
+        images = matcher.resampled(pair.nominal(), grid, RADIUS_PX, context)
+        _, surfaces = matcher.match_forward(images, places, RADIUS_PX, context)
         seconds = time.perf_counter() - started
         count = len(surfaces)
         errors = np.array([math.dist(find_peak(s).shift_px, pair.offset_px) for s in surfaces])

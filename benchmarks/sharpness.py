@@ -22,6 +22,7 @@ import numpy as np
 from groundtie.context import threads
 from groundtie.geometry.transform import Transform
 from groundtie.kinds import plain
+from groundtie.matching.chip_windows import Resampled
 from groundtie.matching.locked import EXACT_PX, find_locked_content
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import survey_places
@@ -165,7 +166,8 @@ def _sameness(
         model = SeriesFrame.around(pair.grid, [pair.grid]).model(displacement)
         truth = Transform(model, pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        locked = find_locked_content(pair, truth, places, Sensors.CAMERAS, EXACT_PX, context)
+        images = Resampled(pair, truth)
+        locked = find_locked_content(images, truth, places, Sensors.CAMERAS, EXACT_PX, context)
     if locked is None:
         raise ValueError("the arrays do not lie on one another")
     return locked.shared.sameness

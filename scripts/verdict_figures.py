@@ -18,7 +18,7 @@ from groundtie.geometry.judging import LARGEST_LOG10_CHANCE
 from groundtie.geometry.models import Frame, PolynomialModel
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.survey import Survey, survey_model, survey_places
+from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 from groundtie.rasters.pair import Image as PairImage
 from groundtie.rasters.pair import make_pair
 from groundtie.rasters.patch import Patch
@@ -187,4 +187,5 @@ def _surveyed(reference: FloatArray, input: FloatArray) -> Survey:
         matcher = ChipMatcher(make_pair(PairImage(one), PairImage(other)), SimilaritySettings())
         none = PolynomialModel("translation", Frame(Affine.identity()), np.zeros((1, 2)))
         places = survey_places(matcher.pair.grid)
-        return survey_model(matcher, none, places, ELSEWHERE_PX, context)
+        images = matcher.resampled(none, places.grid, SURVEY_RADIUS_PX, context)
+        return survey_model(matcher, images, places, ELSEWHERE_PX, context)

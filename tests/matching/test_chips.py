@@ -82,7 +82,8 @@ def test_what_the_reference_shows_is_described_once_for_several_inputs(
 def test_one_way_is_the_same_as_the_first_of_both(pair: ImagePair, context: Context) -> None:
     both = matched(matcher(pair), context)
     places = Places(pair.grid, CENTRES, CHIP)
-    centres, forward = matcher(pair).match_forward(NOMINAL, places, RADIUS, context)
+    images = matcher(pair).resampled(NOMINAL, pair.grid, RADIUS, context)
+    centres, forward = matcher(pair).match_forward(images, places, RADIUS, context)
     np.testing.assert_array_equal(centres, both.centres)
     np.testing.assert_array_equal(forward, both.forward)
 

@@ -16,6 +16,7 @@ from textured_pairs import of_a_sensor, shift_on_map, texture
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
 from groundtie.geometry.transform import Transform
+from groundtie.matching.chip_windows import Resampled
 from groundtie.matching.locked import EXACT_PX, LockedContent, find_locked_content
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import survey_places
@@ -45,7 +46,8 @@ def looked_at(
         pair = make_pair(Image(one), Image(other), search_radius_m=500.0)
         transform = Transform(model or shift_on_map(0.0, 0.0), pair.grid.crs, other.grid)
         places = survey_places(pair.grid)
-        return find_locked_content(pair, transform, places, sensors, exact_px, context)
+        images = Resampled(pair, transform)
+        return find_locked_content(images, transform, places, sensors, exact_px, context)
 
 
 def drawn_into(values: np.ndarray, offset: tuple[int, int] = (0, 0), width: int = 4) -> np.ndarray:
@@ -355,7 +357,8 @@ def found_in(pair: ImagePair, model: Model, context: Context) -> LockedContent |
     """Search two camera images for common content under a model."""
     transform = Transform(model, pair.grid.crs, pair.input.source.grid)
     places = survey_places(pair.grid)
-    return find_locked_content(pair, transform, places, Sensors.CAMERAS, EXACT_PX, context)
+    images = Resampled(pair, transform)
+    return find_locked_content(images, transform, places, Sensors.CAMERAS, EXACT_PX, context)
 
 
 @pytest.mark.parametrize("side_m", [8.0, 10.0])

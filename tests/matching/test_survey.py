@@ -48,9 +48,9 @@ def surveyed(
         without = (
             None if hidden is None else lambda piece: np.ones((piece.height, piece.width), bool)
         )
-        model = shift_on_map(0.0, 0.0)
+        images = matcher.resampled(shift_on_map(0.0, 0.0), pair.grid, SURVEY_RADIUS_PX, context)
         return survey_model(
-            matcher, model, survey_places(pair.grid), ELSEWHERE_PX, context, without
+            matcher, images, survey_places(pair.grid), ELSEWHERE_PX, context, without
         )
 
 

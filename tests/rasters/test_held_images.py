@@ -50,6 +50,9 @@ def test_pieces_are_those_of_the_image(tmp_path: Path, nodata: float | None) -> 
     beyond = held.read(GRID.window(500, 400, 180, 150))
     np.testing.assert_array_equal(beyond.valid.any(axis=0), np.arange(180) < 80)
     assert not held.read(GRID.window(-300, -300, 100, 150)).valid.any()
+    for other in (GRID.scaled(1.28), GRID.shifted(3.0, 0.0)):
+        with pytest.raises(ValueError, match="px off the pixels that are held"):
+            held.read(other)
 
 
 @pytest.mark.parametrize(("nodata", "states"), [(0.0, True), (None, False)])

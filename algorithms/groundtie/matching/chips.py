@@ -12,7 +12,7 @@ from ..context import Context
 from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.models import Model
 from ..geometry.robust import CONSENSUS_PX, find_consensus
-from ..rasters.grid import FloatArray, PointFunction
+from ..rasters.grid import FloatArray, Grid, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
@@ -82,24 +82,24 @@ class ChipMatcher:
         context
             Threads and progress.
         """
-        kept, found = self._run(model, places, radius_px, context, 2)
+        images = self.resampled(model, places.grid, radius_px, context)
+        kept, found = self._run(images, places, radius_px, context, 2)
         forward, backward = found[:, 0], found[:, 1]
         weight = _equal_weight(normalise(forward + backward))
         return ChipSurfaces(kept, forward, backward, weight)
 
+    def resampled(self, model: Model, grid: Grid, radius_px: int, context: Context) -> Resampled:
+        """Return the pair, resampled by a model, for matching within a radius on a grid."""
+        return Resampled.by_model(self.pair, model, grid, radius_px + BORDER_PX, context)
+
     def match_forward(
-        self,
-        model: Model,
-        places: Places,
-        radius_px: int,
-        context: Context,
-        images: Resampled | None = None,
+        self, images: Resampled, places: Places, radius_px: int, context: Context
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and their forward surfaces, at half the cost.
 
-        Parameters as `match`; `images` are the pair's, already resampled by this model.
+        Parameters as `match`; `images` are the pair's, resampled by the model.
         """
-        kept, found = self._run(model, places, radius_px, context, 1, images)
+        kept, found = self._run(images, places, radius_px, context, 1)
         return kept, found[:, 0]
 
     def fit_places(self, layout: ChipLayout) -> Places:
@@ -135,13 +135,7 @@ class ChipMatcher:
         return surfaces
 
     def _run(
-        self,
-        model: Model,
-        places: Places,
-        radius_px: int,
-        context: Context,
-        ways: int,
-        images: Resampled | None = None,
+        self, images: Resampled, places: Places, radius_px: int, context: Context, ways: int
     ) -> tuple[NDArray[np.int_], Surfaces]:
         """Return the centres that could be matched and surfaces (n, ways, 2 r + 1, 2 r + 1).
 
@@ -149,8 +143,7 @@ class ChipMatcher:
         input in the reference, rotated by 180° so that it peaks at the same place.
         """
         reach = radius_px + BORDER_PX
-        seen = images or Resampled.by_model(self.pair, model, places.grid, reach, context)
-        windows = ChipWindows(seen, places, reach, self.held_out)
+        windows = ChipWindows(images, places, reach, self.held_out)
 
         def of_chips(chips: Description, search: Description) -> Surface:
             inner = chips.inner(radius_px)

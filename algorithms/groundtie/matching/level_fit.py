@@ -63,7 +63,8 @@ def fit_level(
     places = Places.spread(
         level, chip, lambda side: np.clip((side - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE)
     )
-    centres, surfaces = matcher.match_forward(model, places, radius_px, context)
+    images = matcher.resampled(model, level, radius_px, context)
+    centres, surfaces = matcher.match_forward(images, places, radius_px, context)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
     step = (np.array(level.size) - chip) / (_CHIPS_PER_SIDE - 1)

@@ -111,20 +111,19 @@ def _inner(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def find_locked_content(
-    pair: ImagePair,
+    images: Resampled,
     transform: Transform,
     places: Places,
     sensors: Sensors,
     exact_px: float,
     context: Context,
-    images: Resampled | None = None,
 ) -> LockedContent | None:
     """Find the content that two images aligned by a transform share.
 
     Parameters
     ----------
-    pair
-        The images.
+    images
+        A pair's, resampled by the transform with a margin of at least 21 px.
     transform
         The transform that was found.
     places
@@ -135,15 +134,13 @@ def find_locked_content(
         A transform within this distance of whole pixels lies on them within its accuracy.
     context
         Threads.
-    images
-        The pair's, resampled by the transform with a margin of at least 21 px; None: they are
-        resampled here.
 
     Returns
     -------
     The shared content. None for an input in sensor geometry, which repeats nothing that is drawn
     on a map, unless the transform shifts the array by whole pixels.
     """
+    pair = images.pair
     whole, off_px = _by_whole_pixels(pair, transform)
     to_input: PointFunction
     if off_px <= exact_px:
@@ -154,9 +151,10 @@ def find_locked_content(
         return None
 
     def windows(by: PointFunction) -> ChipWindows:
-        known = images if by is transform else None
-        # Chips may extend a pixel beyond the grid.
-        seen = known or Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
+        seen = images
+        if by is not transform:
+            # Chips may extend a pixel beyond the grid.
+            seen = Resampled.of(pair, by, places.grid, LOOK_REACH_PX + 1, context)
         return ChipWindows(seen, places, LOOK_REACH_PX, None)
 
     is_near, seen = off_px <= _NEAR_PX, windows(to_input)

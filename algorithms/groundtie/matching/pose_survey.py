@@ -110,7 +110,8 @@ def survey_pose(
     places = _places(_covered(pair.grid, transform))
     level = places.grid
     quiet = context.quiet()
-    kept, surfaces = matcher.match_forward(transform.model, places, SURVEY_RADIUS_PX, quiet)
+    images = matcher.resampled(transform.model, level, SURVEY_RADIUS_PX, quiet)
+    kept, surfaces = matcher.match_forward(images, places, SURVEY_RADIUS_PX, quiet)
     residuals = _cross_fitted_px(kept, surfaces, places.chip_px)
     model = transform.model
     fold_models: tuple[Model, ...] = ()
@@ -123,7 +124,8 @@ def survey_pose(
     surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
     smaller = survey_places(level)
     if smaller.chip_px < places.chip_px:
-        fine = survey_model(matcher, model, smaller, elsewhere_px, quiet)
+        images = matcher.resampled(model, level, SURVEY_RADIUS_PX, quiet)
+        fine = survey_model(matcher, images, smaller, elsewhere_px, quiet)
         surveys = replace(surveys, fine=fine)
     return PoseSurvey(level, kept, residuals, surveys, moved, fold_models)
 

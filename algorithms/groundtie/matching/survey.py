@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.judging import TOLERANCE_PX
-from ..geometry.models import Model
 from ..rasters.grid import FloatArray, Grid
 from ..similarity.order_statistics import robust_deviation
 from ..similarity.peak import peak_shifts
@@ -147,12 +146,11 @@ def survey_places(grid: Grid) -> Places:
 
 def survey_model(
     matcher: ChipMatcher,
-    model: Model,
+    images: Resampled,
     places: Places,
     elsewhere_px: float,
     context: Context,
     without: MaskOf | None = None,
-    images: Resampled | None = None,
 ) -> Survey:
     """Match chips all over a pair around their positions predicted by a model on the map.
 
@@ -160,8 +158,8 @@ def survey_model(
     ----------
     matcher
         Matches the chips.
-    model
-        The model.
+    images
+        The pair's, resampled by the model with a margin of at least the radius.
     places
         The chips, on a regular layout.
     elsewhere_px
@@ -171,11 +169,8 @@ def survey_model(
     without
         Takes a piece of the grid and returns which pixels of the reference are left out; None:
         none.
-    images
-        The pair's, resampled by the model with a margin of at least the radius; None: they are
-        resampled here.
     """
     least = None if without is None else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
-    kept, surfaces = seen.match_forward(model, places, SURVEY_RADIUS_PX, context, images)
+    kept, surfaces = seen.match_forward(images, places, SURVEY_RADIUS_PX, context)
     return Survey(places.grid, kept, peak_shifts(surfaces), surfaces, elsewhere_px)

@@ -15,7 +15,7 @@ from .matcher import MaskOf, Places
 from .parts import Part
 from .phase_survey import PHASES_REACH_PX, survey_unexplained
 from .shared_content import Sensors, SharedContent
-from .survey import Survey, survey_model, survey_places
+from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 
 # In images that are not of two radars or one camera, windows that vary alike and edges that
 # coincide are a small part of what matches. Without one or the other, correct transforms leave 1.1
@@ -109,20 +109,24 @@ def survey_all(
     context
         Threads and progress.
     """
-    pair, model, elsewhere_px = matcher.pair, transform.model, accuracy_px[0]
+    pair, elsewhere_px = matcher.pair, accuracy_px[0]
     # Resampled once for all surveys; chips may extend a pixel beyond the grid.
     images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX + 1, context)
+    on_level = images
+    if places.grid.pixel_size != pair.grid.pixel_size:
+        on_level = matcher.resampled(transform.model, places.grid, SURVEY_RADIUS_PX, context)
     part = context.part(0.0, 0.4)
-    whole = survey_model(matcher, model, places, elsewhere_px, part, images=images)
+    whole = survey_model(matcher, on_level, places, elsewhere_px, part)
     rest = ground = unexplained = None
     if sensors is not None:
         part = context.part(0.4, 0.9)
-        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, images, part)
+        both = images, on_level
+        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, both, part)
         if rest is not None:  # else there is no map layer that the ground could lie beneath
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     if open_ground is not None:
         last = context.part(0.9, 1.0)
-        ground = survey_model(matcher, model, places, elsewhere_px, last, open_ground, images)
+        ground = survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)
     return Surveys(whole, rest, ground, unexplained=unexplained)
 
 
@@ -132,12 +136,13 @@ def survey_rest(
     places: Places,
     accuracy_px: tuple[float, float],
     sensors: Sensors,
-    images: Resampled,
+    images: tuple[Resampled, Resampled],
     context: Context,
 ) -> Rest | None:
     """Survey a pair without the content that is identical in both arrays.
 
-    Parameters as `survey_all`, and the images resampled by the transform.
+    Parameters as `survey_all`, and the images resampled by the transform: on the matching grid, and
+    on that of the chips.
 
     Returns
     -------
@@ -145,10 +150,10 @@ def survey_rest(
     any identical content, unless both are radar images, in which speckle blurs it; nor where the
     content is drawn; nor where the images are copies or views that hide nothing.
     """
-    pair, asked = matcher.pair, survey_places(matcher.pair.grid)
+    whole, on_level = images
     elsewhere_px, exact_px = accuracy_px
-    quiet = context.quiet()
-    locked = find_locked_content(pair, transform, asked, sensors, exact_px, quiet, images)
+    asked, quiet = survey_places(matcher.pair.grid), context.quiet()
+    locked = find_locked_content(whole, transform, asked, sensors, exact_px, quiet)
     if locked is None:
         return None
     shared, chips = locked.shared, len(places.centres)
@@ -161,7 +166,7 @@ def survey_rest(
     once = replace(context, memo=None)
 
     def left_without(mask: MaskOf) -> Survey:
-        return survey_model(fused, transform.model, places, elsewhere_px, once, mask, images)
+        return survey_model(fused, on_level, places, elsewhere_px, once, mask)
 
     if not shared.is_evident:
         left = left_without(locked)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..arrays import Raster
 from ..context import Context
 from .averaging import HELD_PIXELS
-from .grid import Grid, PointFunction, compose
+from .grid import POSITION_ERROR_PX, Grid, PointFunction, compose
 from .handles import ArrayHandles, read_by
 from .metadata import BandInfo
 from .pair import Image, ImagePair
@@ -80,9 +80,19 @@ class HeldImage:
         return cls(image, grid, values, valid, shown)
 
     def read(self, piece: Grid, hidden: Mask | None = None) -> Patch:
-        """Return the image as `Image.read_onto`, on pixels of the grid; none is valid beyond it."""
-        col, row = np.rint(self.grid.map_to_pixel(piece.pixel_to_map([[0, 0]]))[0]).astype(int)
-        part = Window(int(col), int(row), *piece.size)
+        """Return the image as `Image.read_onto`, on pixels of the grid; none is valid beyond it.
+
+        Raises
+        ------
+        ValueError
+            The piece has other pixels than the grid.
+        """
+        px = self.grid.map_to_pixel(piece.pixel_to_map([[0, 0], piece.size]))
+        first, end = np.rint(px).astype(int)
+        off_px = np.abs(px - [first, first + piece.size]).max()
+        if off_px > POSITION_ERROR_PX:
+            raise ValueError(f"a piece lies {off_px:.1f} px off the pixels that are held")
+        part = Window.between(first, end)
         values, valid = _cut(self.values, part), _cut(self.valid, part)
         shown = None if self.shown is None else _cut(self.shown, part)
         return self.image.patch(values, valid, shown, hidden)
