@@ -151,10 +151,14 @@ def test_windows_join(tmp_path: Path) -> None:
         np.testing.assert_array_equal(ground.image(whole, view), parts)
 
 
-def test_what_is_not_known_takes_no_part_and_hides_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("void", "nodata"), [(-9999, -9999), (-9999, None), (32767, None)])
+def test_what_is_not_known_takes_no_part_and_hides_nothing(
+    tmp_path: Path, void: float, nodata: float | None
+) -> None:
+    """Heights that no place on Earth has are voids, declared or not."""
     heights = house(height_m=0)
-    heights[HOUSE] = -9999
-    ground = ground_of(tmp_path, heights, nodata=-9999)
+    heights[HOUSE] = void
+    ground = ground_of(tmp_path, heights, nodata=nodata)
     part = ground.select(ground.scene.whole).part
     expected = np.ones(part.shape, bool)
     expected[79:111, 89:121] = False
