@@ -269,9 +269,11 @@ class TestFootprints:
     def test_heights_stand_on_level_ground(self, tmp_path: Path) -> None:
         model = read_footprints(footprints(tmp_path / "a.gpkg", ["12.5", "8 m", "high"]), GRID)
         heights, known = model.heights(GRID)
-        assert known.all() and not heights.ground_m.any()
+        assert not heights.ground_m.any()
         assert heights.surface_m[65, 30] == 12.5 and heights.surface_m[65, 70] == 8
         assert heights.surface_m[65, 110] == 0 and heights.surface_m[20, 30] == 0
+        # A building whose height is not known is no ground.
+        assert not known[51:80, 101:120].any() and known[:, :99].all() and known[:, 122:].all()
 
     def test_the_higher_of_two_counts(self) -> None:
         ring = [[x, y] for x, y in GRID.pixel_to_map([(9, 9), (30, 9), (30, 30), (9, 30), (9, 9)])]

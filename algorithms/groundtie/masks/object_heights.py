@@ -87,14 +87,19 @@ class FootprintModel:
     ----------
     buildings
         GeoJSON geometries on the map with their heights in metres, lower ones first.
+    unknown
+        Geometries of buildings whose heights are not known.
     """
 
     buildings: tuple[tuple[Any, float], ...]
+    unknown: tuple[Any, ...] = ()
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, all of them known."""
+        """Return heights on a grid, and where they are known."""
         surface = drawn_onto(piece, self.buildings, np.float32, all_touched=True)
-        return Heights(surface, np.zeros_like(surface)), np.ones(surface.shape, bool)
+        shapes = [(area, 1) for area in self.unknown]
+        known = drawn_onto(piece, shapes, np.uint8, all_touched=True) == 0
+        return Heights(surface, np.zeros_like(surface)), known
 
 
 SurfaceModel = RasterModel | FootprintModel
@@ -123,7 +128,7 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
     buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
     if not buildings:
         raise VectorLayerError(f"{path} has no polygons with a height in {field}")
-    return FootprintModel(tuple(buildings))
+    return FootprintModel(tuple(buildings), tuple(area for area, m in found if m is None))
 
 
 def _metres(value: Any) -> float | None:
