@@ -275,6 +275,14 @@ class TestFootprints:
         # A building whose height is not known is no ground.
         assert not known[51:80, 101:120].any() and known[:, :99].all() and known[:, 122:].all()
 
+    def test_a_layer_without_a_building_here_is_refused(self, tmp_path: Path) -> None:
+        away = replace(GRID, transform=compose(Affine.translation(5000, 0), GRID.transform))
+        image = write_raster(tmp_path / "image.tif", np.ones((180, 200), np.uint8), away)
+        model = read_footprints(footprints(tmp_path / "a.gpkg", ["12"]), away)
+        ground = SurfaceGround(Scene.of(open_raster(image)), model, (RADAR,))
+        with pytest.raises(NoOverlapError, match="does not cover"):
+            ground.require_cover()
+
     def test_the_higher_of_two_counts(self) -> None:
         ring = [[x, y] for x, y in GRID.pixel_to_map([(9, 9), (30, 9), (30, 30), (9, 30), (9, 9)])]
         area = {"type": "Polygon", "coordinates": [ring]}
