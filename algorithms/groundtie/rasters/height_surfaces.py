@@ -85,6 +85,12 @@ class RasterSurface:
         measured[measured] = self.valid[self._nearest(*self._reduced(col, row))]
         return measured
 
+    def encloses(self, positions: FloatArray) -> Mask:
+        """Return which positions, (n, 2), lie on values of the raster or in voids amid them."""
+        amid = self.valid | _are_enclosed(self.valid)
+        col, row = np.rint(self.to_px(positions)).T
+        return np.asarray(amid[self._nearest(*self._reduced(col, row))])
+
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface needed for pixel positions, (n, 2)."""
         size = np.array(self.source.grid.size)
