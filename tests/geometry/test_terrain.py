@@ -204,6 +204,23 @@ def test_terrain_models_must_cover_the_overlap() -> None:
     of.require_cover(wider, GRID, UTM)  # nothing more of the input is there
 
 
+@pytest.mark.parametrize("input_dem", [False, True])
+def test_voids_open_to_the_edge_cover_nothing_and_those_amid_heights_do(input_dem: bool) -> None:
+    full = heights(hill)
+
+    def of(void: tuple[slice, slice]) -> Terrain:
+        part = full.copy()
+        part[void] = -9999
+        models = [Raster(values, GRID.transform, UTM) for values in (part, full)]
+        ground, assumed = models[::-1] if input_dem else models
+        return Terrain.open(ground, assumed, UTM, REGION)
+
+    of(np.s_[100:150, 100:180]).require_cover(GRID, GRID, UTM)
+    # 180 of 300 columns are left: 20 of 33 places along a row.
+    with pytest.raises(NoOverlapError, match=r"covers only 60 % of where the images overlap"):
+        of(np.s_[:, 180:]).require_cover(GRID, GRID, UTM)
+
+
 def test_a_terrain_model_without_a_crs_has_no_place_on_a_map_with_one() -> None:
     with pytest.raises(GeoreferencingError, match="only one of"):
         Terrain.open(Raster(heights(hill), GRID.transform), None, UTM, REGION)

@@ -97,6 +97,7 @@ def test_the_item_beside_an_image_is_found(tmp_path: Path) -> None:
         ("", "states no view"),
         ("azimuth=3 incidence=4", "states no view"),
         ("radar azimuth=a incidence=4", "states no view"),
+        ("radar azimuth=3 incidence=4 azimuth=5", "states an angle twice"),
         ("radar azimuth=3", "does not state incidence"),
         ("radar azimuth=3 incidence=2", "must be 5 to 80"),
         ("camera azimuth=3 incidence=85", "must be 0 to 80"),

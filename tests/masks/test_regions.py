@@ -85,6 +85,12 @@ def test_windows_are_cut_from_one_and_the_same_mask(ground: GroundRegions) -> No
     assert not beyond[:, :20].any() and not beyond[10:].any()
 
 
+def test_the_brightest_inside_are_the_same_in_every_window(ground: GroundRegions) -> None:
+    whole = ground.select(ground.part.scene.whole).part
+    halves = [ground.select(Window(col, 0, 200, 400)).part for col in (0, 200)]
+    np.testing.assert_array_equal(np.hstack(halves), whole)
+
+
 def test_larger_scenes_are_looked_at_with_larger_pixels(
     town: Town, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -151,10 +151,14 @@ def test_windows_join(tmp_path: Path) -> None:
         np.testing.assert_array_equal(ground.image(whole, view), parts)
 
 
-def test_what_is_not_known_takes_no_part_and_hides_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("void", "nodata"), [(-9999, -9999), (-9999, None), (32767, None)])
+def test_what_is_not_known_takes_no_part_and_hides_nothing(
+    tmp_path: Path, void: float, nodata: float | None
+) -> None:
+    """Heights that no place on Earth has are voids, declared or not."""
     heights = house(height_m=0)
-    heights[HOUSE] = -9999
-    ground = ground_of(tmp_path, heights, nodata=-9999)
+    heights[HOUSE] = void
+    ground = ground_of(tmp_path, heights, nodata=nodata)
     part = ground.select(ground.scene.whole).part
     expected = np.ones(part.shape, bool)
     expected[79:111, 89:121] = False
@@ -265,9 +269,19 @@ class TestFootprints:
     def test_heights_stand_on_level_ground(self, tmp_path: Path) -> None:
         model = read_footprints(footprints(tmp_path / "a.gpkg", ["12.5", "8 m", "high"]), GRID)
         heights, known = model.heights(GRID)
-        assert known.all() and not heights.ground_m.any()
+        assert not heights.ground_m.any()
         assert heights.surface_m[65, 30] == 12.5 and heights.surface_m[65, 70] == 8
         assert heights.surface_m[65, 110] == 0 and heights.surface_m[20, 30] == 0
+        # A building whose height is not known is no ground.
+        assert not known[51:80, 101:120].any() and known[:, :99].all() and known[:, 122:].all()
+
+    def test_a_layer_without_a_building_here_is_refused(self, tmp_path: Path) -> None:
+        away = replace(GRID, transform=compose(Affine.translation(5000, 0), GRID.transform))
+        image = write_raster(tmp_path / "image.tif", np.ones((180, 200), np.uint8), away)
+        model = read_footprints(footprints(tmp_path / "a.gpkg", ["12"]), away)
+        ground = SurfaceGround(Scene.of(open_raster(image)), model, (RADAR,))
+        with pytest.raises(NoOverlapError, match="does not cover"):
+            ground.require_cover()
 
     def test_the_higher_of_two_counts(self) -> None:
         ring = [[x, y] for x, y in GRID.pixel_to_map([(9, 9), (30, 9), (30, 30), (9, 30), (9, 9)])]

@@ -93,9 +93,11 @@ def test_degrees_are_metres_on_the_ground() -> None:
     assert brightness(geographic, light) == pytest.approx(brightness(projected, light), rel=1e-3)
 
 
-def test_windows_are_parts_of_the_whole_and_voids_stay_voids() -> None:
+@pytest.mark.parametrize("void", [np.nan, -9999.0, 32767.0])
+def test_windows_are_parts_of_the_whole_and_voids_stay_voids(void: float) -> None:
+    """Heights that no place on Earth has are voids, declared or not."""
     heights = np.random.default_rng(0).normal(0, 5, (40, 50)).astype(np.float32)
-    heights[20, 25] = np.nan
+    heights[20, 25] = void
     image = rendered(open_raster(Raster(heights, NORTH_UP, UTM)), Light(SUN, 150.0))
     whole, known = image.read(Window(0, 0, 50, 40))
     part, part_known = image.read(Window(13, 9, 20, 21))

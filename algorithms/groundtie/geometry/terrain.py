@@ -6,6 +6,7 @@ the assumed heights therefore displaces the pixel along the line of sight.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -96,10 +97,12 @@ class Terrain:
     def require_cover(self, grid: Grid, within: Grid, crs: CRS | None) -> None:
         """Refuse terrain models that do not cover the overlap of two grids.
 
+        Voids amid heights are covered; those that are open to the region's edge are not.
+
         Raises
         ------
         NoOverlapError
-            A terrain model does not reach a part of the overlap.
+            A terrain model does not reach a part of the overlap, or has no heights there.
         """
         xy = grid.pixel_to_map(grid.places(_ASKED))
         xy = xy[within.covers(within.to_own_map(xy, crs))]
@@ -107,11 +110,12 @@ class Terrain:
             if surface is None:
                 continue
             own = surface.source.grid
-            known = own.covers(own.to_own_map(xy, crs))
+            known = own.covers(own.to_own_map(xy, crs)) & surface.encloses(xy)
             if not known.all():
+                share = math.floor(100 * known.mean())
                 raise NoOverlapError(
-                    f"{surface.source.path} covers only {100 * known.mean():.0f} % of where the "
-                    "images overlap: give a terrain model of all of it"
+                    f"{surface.source.path} covers only {share} % of where the images overlap: "
+                    "give a terrain model of all of it"
                 )
 
     def to_json(self) -> dict[str, Any]:

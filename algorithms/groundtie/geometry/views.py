@@ -157,7 +157,10 @@ def parse_view(text: str) -> View:
     found = [_WORD.fullmatch(word) for word in words]
     if sensor not in SENSORS or None in found:
         raise ParameterError(f"{text!r} states no view: {_USAGE}")
-    return _view(sensor, {match[1]: float(match[2]) for match in found if match}, repr(text))
+    values = {match[1]: float(match[2]) for match in found if match}
+    if len(values) < len(words):
+        raise ParameterError(f"{text!r} states an angle twice: {_USAGE}")
+    return _view(sensor, values, repr(text))
 
 
 def read_view(path: Path) -> View:

@@ -14,12 +14,12 @@ import numpy as np
 from ..errors import VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid
-from ..rasters.height_units import in_metres
+from ..rasters.height_surfaces import read_heights
 from ..rasters.patch import window_sums
 from ..rasters.reading import FloatImage, Mask, RasterSource
+from ..rasters.warping import sample_by
 from .layer import AREAS, drawn_onto
 from .ray_casting import Heights
-from .scene import sampled_onto
 
 # Wider objects count as ground: halls and blocks are at most this wide, or have courtyards.
 WIDEST_M = 100.0
@@ -62,8 +62,14 @@ class RasterModel:
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
         """Return heights on a grid, and where they are known; the ground is found on this grid."""
-        stored, known = sampled_onto(piece, self.raster, "bilinear", self.band)
-        surface = in_metres(stored, self.raster, self.band)
+        to_px = piece.to_pixels_of(self.raster.grid)
+        surface, known = sample_by(
+            self.raster,
+            piece,
+            to_px,
+            "bilinear",
+            lambda part, out: read_heights(self.raster, part, out, self.band),
+        )
         if not known.any():
             return Heights(np.zeros_like(surface), np.zeros_like(surface)), known
         ground = bare_ground(surface, known, piece.pixel_size_m)
@@ -81,14 +87,19 @@ class FootprintModel:
     ----------
     buildings
         GeoJSON geometries on the map with their heights in metres, lower ones first.
+    unknown
+        Geometries of buildings whose heights are not known.
     """
 
     buildings: tuple[tuple[Any, float], ...]
+    unknown: tuple[Any, ...] = ()
 
     def heights(self, piece: Grid) -> tuple[Heights, Mask]:
-        """Return heights on a grid, all of them known."""
+        """Return heights on a grid, and where they are known."""
         surface = drawn_onto(piece, self.buildings, np.float32, all_touched=True)
-        return Heights(surface, np.zeros_like(surface)), np.ones(surface.shape, bool)
+        shapes = [(area, 1) for area in self.unknown]
+        known = drawn_onto(piece, shapes, np.uint8, all_touched=True) == 0
+        return Heights(surface, np.zeros_like(surface)), known
 
 
 SurfaceModel = RasterModel | FootprintModel
@@ -117,7 +128,7 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
     buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
     if not buildings:
         raise VectorLayerError(f"{path} has no polygons with a height in {field}")
-    return FootprintModel(tuple(buildings))
+    return FootprintModel(tuple(buildings), tuple(area for area, m in found if m is None))
 
 
 def _metres(value: Any) -> float | None:

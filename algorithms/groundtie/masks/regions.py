@@ -75,9 +75,11 @@ class GroundRegions:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
-        patch = self.part.scene.read(window)
-        chosen = self.part.cut(window) & (_smooth(patch) <= self.high)
-        return Selection(chosen & patch.valid, patch.valid)
+        around = window.widened(BLOCK_PX)
+        patch, inside = self.part.scene.read(around), window.slices_in(around)
+        chosen = self.part.cut(window) & (_smooth(patch)[inside] <= self.high)
+        valid = patch.valid[inside]
+        return Selection(chosen & valid, valid)
 
 
 def find_regions(

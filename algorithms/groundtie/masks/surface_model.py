@@ -21,7 +21,13 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tiles
-from .object_heights import GROUND_REACH_M, LOWEST_M, SurfaceModel, ground_cell_px
+from .object_heights import (
+    GROUND_REACH_M,
+    LOWEST_M,
+    FootprintModel,
+    SurfaceModel,
+    ground_cell_px,
+)
 from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, radar_echoes
 from .scene import Scene, Selection, write_tiles
 from .threshold import grown
@@ -117,7 +123,9 @@ class SurfaceGround:
 
     def require_cover(self) -> None:
         """Raise `NoOverlapError` if the model has no heights in the scene."""
-        if self._highest_m is None:
+        # A layer states no extent: without a building here, it is one of another place.
+        is_layer = isinstance(self.model, FootprintModel)
+        if self._highest_m is None or (is_layer and self._highest_m == 0):
             raise NoOverlapError("the surface model does not cover the reference")
 
     def _around(self, window: Window) -> tuple[Heights, Mask, tuple[slice, slice]]:

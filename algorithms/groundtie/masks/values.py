@@ -47,7 +47,7 @@ class MaskValues:
         return np.asarray(found)
 
 
-# No data, defects, clouds and their shadows; water and snow take part.
+# No data, defects, clouds and their shadows; water takes part, and so does snow but in `udm2`.
 SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
     {
         # Sentinel-2's scene classification: no data, saturated, shadow, clouds [MainKnorn2017].
@@ -59,7 +59,7 @@ SCHEMES: Mapping[str, MaskValues] = MappingProxyType(
         # Harmonized Landsat Sentinel-2: cirrus, cloud, adjacent to either, shadow [Claverie2018];
         # fill has all bits set.
         "hls-fmask": MaskValues(bits=0b1111),
-        # Planet's usable data mask: its first band is 0 where the ground is hidden [Planet2022].
+        # Planet's usable data mask: its first band is 0 on cloud, haze, shadow, snow [Planet2022].
         "udm2": MaskValues(((0, 0),)),
     }
 )

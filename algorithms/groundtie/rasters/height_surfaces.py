@@ -85,6 +85,12 @@ class RasterSurface:
         measured[measured] = self.valid[self._nearest(*self._reduced(col, row))]
         return measured
 
+    def encloses(self, positions: FloatArray) -> Mask:
+        """Return which positions, (n, 2), lie on values of the raster or in voids amid them."""
+        amid = self.valid | _are_enclosed(self.valid)
+        col, row = np.rint(self.to_px(positions)).T
+        return np.asarray(amid[self._nearest(*self._reduced(col, row))])
+
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface needed for pixel positions, (n, 2)."""
         size = np.array(self.source.grid.size)
@@ -161,17 +167,24 @@ def _parts(px: FloatArray) -> list[NDArray[np.int_]]:
 
 
 def read_heights(
-    source: RasterSource, window: Window, out_shape: tuple[int, int] | None = None
+    source: RasterSource,
+    window: Window,
+    out_shape: tuple[int, int] | None = None,
+    band: int = 1,
 ) -> tuple[FloatImage, Mask]:
     """Return heights in metres and which of them are valid, as `RasterSource.read`.
 
     Overviews are not read, as their means include undeclared voids.
     """
-    if out_shape is not None:
-        return average_window(read_heights, source, source, window, out_shape)
-    stored, valid = source.read(window, 1)
-    values = in_metres(stored, source)
-    return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
+
+    def heights(whole: RasterSource, part: Window) -> tuple[FloatImage, Mask]:
+        stored, valid = whole.read(part, band)
+        values = in_metres(stored, whole, band)
+        return values, valid & (values > _LOWEST_M) & (values < _HIGHEST_M)
+
+    if out_shape is None:
+        return heights(source, window)
+    return average_window(heights, source, source, window, out_shape)
 
 
 def surface_around(

@@ -13,7 +13,7 @@ import numpy as np
 from ..geometry.views import RADAR
 from .grid import Grid
 from .handles import read_by
-from .height_units import in_metres
+from .height_surfaces import read_heights
 from .metadata import BandInfo
 from .reading import FloatImage, RasterSource, Window
 
@@ -116,8 +116,7 @@ class _Rendering:
         """
         (top, bottom), (left, right) = window.toranges()
         around = Window(int(left) - 1, int(top) - 1, int(right - left) + 2, int(bottom - top) + 2)
-        stored, valid = self.heights.read(around, self.band)
-        values = in_metres(stored, self.heights, self.band)
+        values, valid = read_heights(self.heights, around, band=self.band)
         values[~valid] = np.nan
         return self.light.shade(*_slopes(values, self.heights.grid))[None]
 
