@@ -279,6 +279,25 @@ def test_a_table_that_a_person_made(tmp_path: Path) -> None:
     assert found.is_check.tolist() == [False]
 
 
+@pytest.mark.parametrize("turn", [-360.0, 0.0, 360.0])
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("a.csv", "reference_x,reference_y,input_x,input_y"),
+        ("a.points", "mapX,mapY,sourceX,sourceY"),
+    ],
+)
+def test_longitudes_in_the_input_may_count_from_elsewhere(
+    tmp_path: Path, name: str, columns: str, turn: float
+) -> None:
+    # The raster counts from 0: its column 0 is centred on 350.0005 degrees, which is -9.9995.
+    grid = Grid(Affine(1e-3, 0, 350.0, 0, -1e-3, 45.0), CRS.from_epsg(4326), 200, 200)
+    path = tmp_path / name
+    path.write_text(f"{columns}\n-9.9,44.9,{350.1005 + turn!r},44.9005\n")
+    found = read_tie_points(path, grid)
+    np.testing.assert_allclose(found.input_px, [[100.0, 99.0]], atol=1e-6)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".points"])
 def test_a_row_with_more_fields_than_the_first_line_is_refused(tmp_path: Path, suffix: str) -> None:
     """As of decimal commas, whose last one would cut the last number off."""

@@ -256,7 +256,8 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     if input_grid.is_georeferenced and NOMINAL[0] in names:
         px = input_grid.map_to_pixel(input_grid.to_own_map(columns(rows, *NOMINAL), crs))
     if INPUT[0] in names:
-        on_map = input_grid.map_to_pixel(columns(rows, *INPUT))
+        own_xy = input_grid.to_own_map(columns(rows, *INPUT), input_grid.crs)
+        on_map = input_grid.map_to_pixel(own_xy)
         px = np.where(np.isfinite(px), px, on_map)
     for place in np.flatnonzero(~np.isfinite(px).all(axis=1)):
         px[place] = position(rows[place], *PIXEL, int(place) + 1)
