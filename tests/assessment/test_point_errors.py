@@ -53,9 +53,11 @@ class TestPointErrors:
         transform = shifted(0.0, 0.0, DEGREES, LONLAT)
         xy = places(grid=DEGREES)
         found = PointErrors.of(transform, xy, transform(xy) + [1.0, 0.0])
-        # A ten-thousandth of a degree of longitude on the sphere, at 45.1° north
-        expected = 6_371_000 * math.radians(1e-4) * math.cos(math.radians(45.135))
-        np.testing.assert_allclose(found.in_metres.bias, [expected, 0], rtol=1e-3, atol=1e-6)
+        # A ten-thousandth of a degree of longitude on the ellipsoid of WGS 84, at 45.135° north.
+        latitude = math.radians(45.135)
+        across_m = 6_378_137 / math.sqrt(1 - 0.00669438 * math.sin(latitude) ** 2)
+        expected = across_m * math.radians(1e-4) * math.cos(latitude)
+        np.testing.assert_allclose(found.in_metres.bias, [expected, 0], rtol=1e-5, atol=1e-6)
 
     @pytest.mark.parametrize("turn", [0.0, 360.0, -360.0])
     def test_metres_across_the_antimeridian(self, turn: float) -> None:
@@ -64,7 +66,7 @@ class TestPointErrors:
         transform, xy = shifted(0.0, 0.0, grid, LONLAT), grid.pixel_to_map([[70.0, 20.0]])
         found = PointErrors.of(transform, xy + [turn, 0], transform(xy) + [1.0, 0.0])
         assert found.error_px[0] == pytest.approx([1.0, 0.0], abs=1e-6)
-        assert found.in_metres.bias == pytest.approx([111.2, 0.0], rel=2e-3, abs=1e-6)
+        assert found.in_metres.bias == pytest.approx([111.32, 0.0], rel=1e-4, abs=1e-6)
 
     def test_a_stretch_shows_in_metres_where_the_registered_image_has_the_point(self) -> None:
         """The input claims all distances half as long: its pixel is worth two on the map."""

@@ -145,6 +145,29 @@ def test_geojson_is_in_longitude_and_latitude(tmp_path: Path) -> None:
     np.testing.assert_allclose(ends, expected, atol=1e-9)
 
 
+def test_lines_across_the_antimeridian_do_not_run_around_the_globe(tmp_path: Path) -> None:
+    zone = CRS.from_epsg(32760)
+    on_it = reproject(np.array([[180.0, -17.0]]), CRS.from_epsg(4326), zone)
+    x, y = on_it[0] + [-2000, 2000]
+    grid = Grid(Affine(10, 0, x, 0, -10, y), zone, 400, 300)
+    px = np.array([[200.0, 199.5], [100.0, 50.0], [300.0, 150.0]])
+    nominal_xy = grid.pixel_to_map(px)
+    assert nominal_xy[0].tolist() == pytest.approx((on_it[0] + [5, 0]).tolist())
+    points = TiePoints.unmeasured(nominal_xy - SHIFT, px, zone)
+    path = tmp_path / "a.geojson"
+    write_tie_points(path, points, Transform.nominal(zone, grid))
+    features = json.loads(path.read_text())["features"]
+    lines = np.array([feature["geometry"]["coordinates"] for feature in features])
+    # SHIFT is 36 m long.
+    assert np.abs(np.diff(lines, axis=1)).max() < 50 / 100_000
+    for end, places in enumerate((nominal_xy, points.reference_xy)):
+        found_xy = reproject(lines[:, end], CRS.from_epsg(4326), zone)
+        np.testing.assert_allclose(found_xy, places, atol=1e-3)
+    found = read_tie_points(path, grid)
+    assert not found.edited.any()
+    np.testing.assert_allclose(found.reference_xy, points.reference_xy, rtol=1e-12)
+
+
 def test_numbers_that_are_not_finite_become_null(tmp_path: Path) -> None:
     points, transform = made(UTM, GRID)
     points.forward_backward_error_px[0] = np.inf
@@ -277,6 +300,25 @@ def test_a_table_that_a_person_made(tmp_path: Path) -> None:
     assert found.crs == UTM
     assert found.used.tolist() == [True]
     assert found.is_check.tolist() == [False]
+
+
+@pytest.mark.parametrize("turn", [-360.0, 0.0, 360.0])
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("a.csv", "reference_x,reference_y,input_x,input_y"),
+        ("a.points", "mapX,mapY,sourceX,sourceY"),
+    ],
+)
+def test_longitudes_in_the_input_may_count_from_elsewhere(
+    tmp_path: Path, name: str, columns: str, turn: float
+) -> None:
+    # The raster counts from 0: its column 0 is centred on 350.0005 degrees, which is -9.9995.
+    grid = Grid(Affine(1e-3, 0, 350.0, 0, -1e-3, 45.0), CRS.from_epsg(4326), 200, 200)
+    path = tmp_path / name
+    path.write_text(f"{columns}\n-9.9,44.9,{350.1005 + turn!r},44.9005\n")
+    found = read_tie_points(path, grid)
+    np.testing.assert_allclose(found.input_px, [[100.0, 99.0]], atol=1e-6)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".points"])

@@ -84,6 +84,33 @@ class TestWithGeoreferencing:
         assert width / height == pytest.approx(2, rel=0.01)
 
     @pytest.mark.slow
+    @pytest.mark.parametrize("west", [179.95, 349.95])
+    @pytest.mark.parametrize("turns", [(0, -360), (-360, 0)])
+    def test_longitudes_may_count_from_elsewhere(
+        self, tmp_path: Path, west: float, turns: tuple[int, int]
+    ) -> None:
+        degrees, pose = CRS.from_epsg(4326), Pose(20.0, 1.1, (3.0, -2.0))
+        values = np.random.default_rng(0).normal(size=(80, 90))
+        found = []
+        for own, other in ((0, 0), turns):
+            paths = [
+                write_raster(
+                    tmp_path / name,
+                    values,
+                    Grid(Affine(0.001, 0, west + turn, 0, -0.001, 10.0), degrees, 90, 80),
+                )
+                for name, turn in (("a.tif", own), ("b.tif", other))
+            ]
+            windows = windows_of(*paths)
+            transform = windows.transform(pose)
+            again = windows.pose(transform)
+            assert again.rotation_deg == pytest.approx(pose.rotation_deg, abs=1e-6)
+            assert again.shift_px == pytest.approx(pose.shift_px, abs=1e-6)
+            places = windows.reference_grid.pixel_to_map(windows.reference_grid.places())
+            found.append((windows.input.values, transform(places)))
+        np.testing.assert_allclose(found[1][0], found[0][0], atol=1e-5)
+        np.testing.assert_allclose(found[1][1], found[0][1], atol=1e-6)
+
     def test_large_images_are_reduced(self, tmp_path: Path) -> None:
         grid = utm_grid(1300, 900)
         windows = windows_of(waves(tmp_path / "a.tif", grid), waves(tmp_path / "b.tif", grid))

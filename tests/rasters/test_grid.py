@@ -115,16 +115,21 @@ def test_the_outline_runs_around_the_outer_border() -> None:
     assert on_border.all()
 
 
-def test_metres_per_degree_shrink_with_the_latitude() -> None:
-    equator = Grid(Affine(0.001, 0, 9, 0, -0.001, 0.005), WGS84, 10, 10)
-    north = Grid(Affine(0.001, 0, 9, 0, -0.001, 60.005), WGS84, 10, 10)
-    assert equator.metres_per_unit[0] == pytest.approx(111_195, rel=1e-3)
-    assert north.metres_per_unit[0] == pytest.approx(0.5 * 111_195, rel=1e-3)
-    assert north.metres_per_unit[1] == pytest.approx(111_195, rel=1e-3)
-    # 111.195 m by half of it
-    assert north.pixel_size_m == pytest.approx(111.195 * math.sqrt(0.5), rel=1e-3)
-    assert north.pixel_sides_m == pytest.approx((111.195 / 2, 111.195), rel=1e-3)
-    assert north.metres_per_pixel == pytest.approx(111.195, rel=1e-3)
+@pytest.mark.parametrize("latitude", [0.0, 30.0, -45.0, 60.0, 89.0])
+def test_degrees_have_their_length_on_the_ellipsoid(latitude: float) -> None:
+    """As PROJ has them: an azimuthal equidistant map has true distances from its centre."""
+    centre = np.array([9.0, latitude])
+    grid = Grid(Affine(2e-4, 0, 8.999, 0, -1e-4, latitude + 5e-4), WGS84, 10, 10)
+    local = CRS.from_proj4(f"+proj=aeqd +lat_0={latitude} +lon_0=9 +datum=WGS84")
+    half = 5e-4 * np.eye(2)
+    (x, _, before_x, _), (_, y, _, before_y) = reproject(
+        np.concatenate([centre + half, centre - half]), WGS84, local
+    ).T
+    east, north = (x - before_x) * 1000, (y - before_y) * 1000
+    assert grid.metres_per_unit == pytest.approx((east, north), rel=1e-6)
+    assert grid.pixel_sides_m == pytest.approx((2e-4 * east, 1e-4 * north), rel=1e-6)
+    assert grid.pixel_size_m == pytest.approx(1e-4 * math.sqrt(2 * east * north), rel=1e-6)
+    assert grid.metres_per_pixel == pytest.approx(max(2e-4 * east, 1e-4 * north), rel=1e-6)
 
 
 def test_feet_are_not_metres() -> None:
@@ -248,10 +253,11 @@ def test_grads_are_no_degrees() -> None:
     """400 grads are 360°: 60 grads of latitude are 54°."""
     place = Affine(0.001, 0, 2, 0, -0.001, 60.005)
     grads = Grid(place, CRS.from_epsg(4807), 10, 10).metres_per_unit
-    assert grads[1] == pytest.approx(0.9 * 111_195)
-    assert grads[0] == pytest.approx(0.9 * 111_195 * math.cos(math.radians(54)), rel=1e-6)
+    degrees = Grid(Affine(9e-4, 0, 2, 0, -9e-4, 54.0045), WGS84, 10, 10).metres_per_unit
+    assert grads == pytest.approx(0.9 * np.array(degrees), rel=1e-6)
     from_wkt = CRS.from_wkt(WGS84.to_wkt())
-    assert Grid(place, from_wkt, 10, 10).metres_per_unit[1] == 111_195
+    in_degrees = (Grid(place, crs, 10, 10).metres_per_unit for crs in (WGS84, from_wkt))
+    assert next(in_degrees) == next(in_degrees)
 
 
 class TestAcrossTheAntimeridian:

@@ -82,10 +82,8 @@ def test_pixels_need_not_lie_north_up() -> None:
 
 
 def test_degrees_are_metres_on_the_ground() -> None:
-    degree = 111_195.0
-    latitude = math.radians(60)
-    step = PX_M / degree
-    turned = Affine(step / math.cos(latitude), 0, 10, 0, -step, 60)
+    # Lengths of a degree at 60° on the ellipsoid of WGS 84.
+    turned = Affine(PX_M / 55_800.0, 0, 10, 0, -PX_M / 111_412.3, 60)
     heights = 0.4 * PX_M * np.tile(np.arange(30, dtype=np.float32), (20, 1))
     geographic = open_raster(Raster(heights, turned, CRS.from_epsg(4326)))
     projected = open_raster(Raster(heights, NORTH_UP, UTM))

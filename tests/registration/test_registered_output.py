@@ -154,6 +154,17 @@ def test_what_lies_outside_of_the_overlap(overlap: Grid, share: float) -> None:
     assert "warning" not in beyond.line()
 
 
+def test_the_share_outside_of_the_overlap_is_that_of_the_area() -> None:
+    """Wherever a border lies: the mean over many is not biased."""
+    transform = Transform(shift_on_map(0.0, 0.0), UTM, GRID)
+    errors = []
+    for px in np.arange(5.0, 45.0, 0.5):
+        beyond = BeyondOverlap.of("input", transform, GRID.shifted(10 * px, 10 * px).covers)
+        assert beyond is not None
+        errors.append(beyond.share - (1 - (1 - px / 200) * (1 - px / 150)))
+    assert np.mean(errors) == pytest.approx(0, abs=1e-3)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_models_that_bend_are_warned_of(kind: str) -> None:
     beyond = BeyondOverlap(0.78, kind)

@@ -122,11 +122,11 @@ def test_rotation_and_scale_are_those_of_the_transform(
 
 
 def test_metres_in_degrees_are_those_along_each_axis() -> None:
-    """At 60° north a degree has half as many metres to the east as to the north."""
+    """At 60° north a degree of longitude has 55,800 m, one of latitude 111,412 m (WGS 84)."""
     grid = Grid(Affine(1e-4, 0, 9, 0, -1e-4, 60.005), CRS.from_epsg(4326), 100, 100)
     found = Correction.of(Transform(shift_model(-6e-4, -4e-4), grid.crs, grid), grid)
-    assert found.direction == "33.4 m east, 44.5 m north"
-    assert f"7.2 px ({math.hypot(33.4, 44.5):.1f} m) at the centre" in found.text()
+    assert found.direction == "33.5 m east, 44.6 m north"
+    assert f"7.2 px ({math.hypot(33.48, 44.56):.1f} m) at the centre" in found.text()
 
 
 def test_the_direction_where_x_leads_west_and_y_south() -> None:

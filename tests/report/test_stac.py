@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from affine import Affine
 from contexts import context
 from raster_files import utm_grid, write_raster
 from rasterio.crs import CRS
-from rasterio.warp import transform_bounds
+from rasterio.warp import transform, transform_bounds
+from shapely.geometry import LinearRing, Polygon
 from textured_pairs import TexturedPair, shift_on_map
 from tools.conftest import textured
 
@@ -62,10 +64,33 @@ def test_the_fields_are_those_of_the_extensions(tmp_path: Path) -> None:
     west, south, east, north = transform_bounds(GRID.crs, "EPSG:4326", *fields["proj:bbox"])
     assert found["bbox"] == pytest.approx([west, south, east, north], abs=1e-5)
     ring = found["geometry"]["coordinates"][0]
-    assert found["geometry"]["type"] == "Polygon" and ring[0] == ring[-1] and len(ring) == 5
+    assert found["geometry"]["type"] == "Polygon" and ring[0] == ring[-1]
     asset = found["assets"]["data"]
     assert asset["href"] == "../out/moved.cog.tif"
     assert asset["type"] == "image/tiff; application=geotiff; profile=cloud-optimized"
+
+
+@pytest.mark.parametrize(
+    ("epsg", "place", "tolerance_deg"),
+    [
+        (32632, Affine(10, 0, 445_200, 0, -10, 5_500_000), 1e-5),  # a tile of Sentinel-2
+        (32632, Affine(10, 0, 445_200, 0, 10, 5_500_000), 1e-5),  # the same with y up
+        (3413, Affine(100, 0, -500_000, 0, -100, -1_000_000), 1e-2),
+    ],
+)
+def test_the_footprint_holds_all_pixels(
+    tmp_path: Path, epsg: int, place: Affine, tolerance_deg: float
+) -> None:
+    """Borders are curved on the globe, and RFC 7946 has outer rings run counterclockwise."""
+    grid = Grid(place, CRS.from_epsg(epsg), 10_980, 10_980)
+    found: Any = item(tmp_path, grid)
+    bounds = transform_bounds(grid.crs, "EPSG:4326", *found["properties"]["proj:bbox"], 201)
+    assert found["bbox"] == pytest.approx(bounds, abs=tolerance_deg)
+    (ring,) = found["geometry"]["coordinates"]
+    assert LinearRing(ring).is_ccw and LinearRing(ring).is_valid
+    places = transform(grid.crs, "EPSG:4326", *grid.pixel_to_map(grid.outline(101)).T)
+    whole = Polygon(np.column_stack(places))
+    assert whole.difference(Polygon(ring)).area < 1e-3 * whole.area
 
 
 @pytest.mark.parametrize(

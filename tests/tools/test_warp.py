@@ -268,8 +268,8 @@ def test_rigid_models_preserve_shapes_also_in_degrees(tmp_path: Path) -> None:
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     px = np.random.default_rng(0).uniform(10, 90, (12, 2))
     xy = grid.pixel_to_map(px)
-    # Pixels are square on the ground but for the sphere: 11.1 m on both sides, at 59.995°.
-    metres = np.array([111_195 * np.cos(np.deg2rad(59.995)), 111_195])
+    # Lengths of a degree at 59.995° on the ellipsoid of WGS 84.
+    metres = np.array([55_808.4, 111_412.2])
     centre = xy.mean(axis=0)
     reference_xy = ((xy - centre) * metres) @ turn / metres + centre
     path = tmp_path / "t.csv"

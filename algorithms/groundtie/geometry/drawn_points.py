@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from ..rasters.grid import FloatArray, Grid, reproject
+from ..rasters.grid import FloatArray, Grid, near_longitude, reproject
 from .point_tables import INPUT, NOMINAL, PIXEL, REFERENCE, Row, columns
 from .vector_layers import simple_geometries
 
@@ -83,7 +83,10 @@ def follow_lines(
     """
     stated = np.stack([columns(rows, *NOMINAL), columns(rows, *REFERENCE)], axis=1)
     drawn = np.asarray(np.isfinite(ends).all(axis=(1, 2)))
-    moved = drawn[:, None] & ~_same(ends, _projected(stated, crs, layer_crs))
+    written = _projected(stated, crs, layer_crs).reshape(-1, 2)
+    # Layers may count longitudes from elsewhere.
+    written = near_longitude(written, ends.reshape(-1, 2)[:, :1], layer_crs)
+    moved = drawn[:, None] & ~_same(ends, written.reshape(ends.shape))
     # A row that locates its point by input coordinates may have no nominal position to compare.
     elsewhere = np.isfinite(columns(rows, *INPUT)) | np.isfinite(columns(rows, *PIXEL))
     moved[:, 0] &= np.isfinite(stated[:, 0]).all(1) | ~elsewhere.all(1)

@@ -56,7 +56,9 @@ def read_georeferencer(path: Path, input_grid: Grid) -> TiePoints:
     rows = table_rows(lines, ("mapX", "mapY"))
     # Older versions of QGIS named the columns `pixelX` and `pixelY`.
     x, y = ("pixelX", "pixelY") if rows and "pixelX" in rows[0] else ("sourceX", "sourceY")
-    input_px = _source_grid(input_grid).map_to_pixel(require_places(positions(rows, x, y)))
+    grid = _source_grid(input_grid)
+    source_xy = require_places(positions(rows, x, y))
+    input_px = grid.map_to_pixel(grid.to_own_map(source_xy, grid.crs))
     states = [USED if _is_enabled(row) else "rejected: disabled" for row in rows]
     reference_xy = require_places(positions(rows, "mapX", "mapY"))
     return TiePoints.unmeasured(reference_xy, input_px, crs, states)

@@ -17,7 +17,15 @@ from rasterio.errors import CRSError
 from ..errors import OutputError, TransformFileError
 from ..kinds import plain
 from ..rasters.atomic import write_csv, write_json, writing
-from ..rasters.grid import LON_LAT, FloatArray, Grid, crs_name, reproject, require_map
+from ..rasters.grid import (
+    LON_LAT,
+    FloatArray,
+    Grid,
+    crs_name,
+    near_longitude,
+    reproject,
+    require_map,
+)
 from ..runs import run_tags
 from ..strict_json import read_json
 from .drawn_points import follow_lines, line_ends
@@ -163,8 +171,9 @@ def _rows(points: TiePoints, transform: Transform) -> list[Row]:
 
 def _features(rows: list[Row], crs: CRS | None, target: CRS | None) -> list[dict[str, Any]]:
     """Return rows as GeoJSON features: lines from nominal to reference positions in a CRS."""
-    ends = [positions(rows, *names) for names in (NOMINAL, REFERENCE)]
-    lines = np.stack([reproject(end, crs, target) for end in ends], axis=1)
+    start, end = (reproject(positions(rows, *names), crs, target) for names in (NOMINAL, REFERENCE))
+    # Across the antimeridian, longitudes go on: lines would otherwise run around the globe.
+    lines = np.stack([start, near_longitude(end, start[:, :1], target)], axis=1)
     return [
         {
             "type": "Feature",
@@ -256,7 +265,8 @@ def _input_px(rows: list[Row], input_grid: Grid, crs: CRS | None) -> FloatArray:
     if input_grid.is_georeferenced and NOMINAL[0] in names:
         px = input_grid.map_to_pixel(input_grid.to_own_map(columns(rows, *NOMINAL), crs))
     if INPUT[0] in names:
-        on_map = input_grid.map_to_pixel(columns(rows, *INPUT))
+        own_xy = input_grid.to_own_map(columns(rows, *INPUT), input_grid.crs)
+        on_map = input_grid.map_to_pixel(own_xy)
         px = np.where(np.isfinite(px), px, on_map)
     for place in np.flatnonzero(~np.isfinite(px).all(axis=1)):
         px[place] = position(rows[place], *PIXEL, int(place) + 1)

@@ -77,7 +77,8 @@ class PoseWindows:
         own, other = self.reference_grid.centre_px, self.input_grid.centre_px
         outline = self.reference_grid.outline(4)
         input_px = transform(self.reference_grid.pixel_to_map(outline))
-        moved = self.input_grid.map_to_pixel(self.nominal.inverse(input_px))
+        nominal_xy = self.input_grid.to_own_map(self.nominal.inverse(input_px), self.nominal.crs)
+        moved = self.input_grid.map_to_pixel(nominal_xy)
         # Rotation and scale of positions (right, down) are one complex factor.
         start, end = ((px - centre) @ (1, 1j) for px, centre in ((outline, own), (moved, other)))
         design = np.column_stack([start, np.ones(len(start))])
@@ -120,7 +121,7 @@ def read_windows(
     own = reference.source.grid
     frame = _metric_frame(own)
     low, high = _box(frame, own.pixel_to_map(own.outline()))
-    outline = nominal.inverse(nominal.input_grid.outline())
+    outline = own.to_own_map(nominal.inverse(nominal.input_grid.outline()), nominal.crs)
     if not np.isfinite(outline).all():
         raise NoOverlapError(_apart(reference, input))
     nominal_low, nominal_high = _box(frame, outline)

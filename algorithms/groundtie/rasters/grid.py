@@ -7,6 +7,7 @@ everywhere else (the first pixel's centre is at 0).
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 from collections.abc import Callable, Mapping
@@ -30,9 +31,6 @@ PointFunction = Callable[[FloatArray], FloatArray]
 
 # Longitude and latitude.
 LON_LAT = CRS.from_epsg(4326)
-
-# Metres per degree on the sphere of the Earth's mean radius: for sizes and search radii only.
-METRES_PER_DEGREE = 111_195.0
 
 # Lower limit for the shrinking of units towards a pole, where their length is 0.
 _LEAST_SHRINK = 1e-6
@@ -157,8 +155,8 @@ class Grid:
         centre = self.pixel_to_map([self.centre_px])[0]
         if self.crs.is_geographic:
             degrees = _degrees_per_unit(self.crs)
-            shrink = _shrink(centre[1] * degrees)
-            return METRES_PER_DEGREE * degrees * shrink, METRES_PER_DEGREE * degrees
+            east, north = _metres_per_degree(centre[1] * degrees)
+            return east * degrees, north * degrees
         unit_m = float(self.crs.linear_units_factor[1])
         scale = _scale_on_the_ground(centre, unit_m, self.crs)
         if 'PROJECTION["Mercator' not in self.crs.to_wkt() and _is_for_surveys(scale):
@@ -176,7 +174,7 @@ class Grid:
         if self.crs is None or self.crs.is_geographic:
             return along_axes
         centre = reproject(self.pixel_to_map([self.centre_px]), self.crs, LON_LAT)
-        half = np.diag([1 / _shrink(centre[0, 1]), 1.0]) * (_STEP_M / METRES_PER_DEGREE / 2)
+        half = np.diag(_STEP_M / 2 / np.array(_metres_per_degree(centre[0, 1])))
         ends = reproject(np.concatenate([centre + half, centre - half]), LON_LAT, self.crs)
         if not np.isfinite(ends).all():
             return along_axes
@@ -344,11 +342,16 @@ def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | Non
     return np.asarray(xy - turns * [turn, 0]) if turns.any() else xy
 
 
-def _shrink(latitude_deg: float) -> float:
-    """Return the length of a degree of longitude as a share of that of a degree of latitude."""
+def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:
+    """Return the lengths of a degree of longitude and of a degree of latitude, on the ellipsoid."""
     # Positions outside of a projection's domain are infinite.
     with np.errstate(invalid="ignore"):
-        return max(float(np.cos(np.deg2rad(latitude_deg))), _LEAST_SHRINK)
+        sine, cosine = (float(f(np.deg2rad(latitude_deg))) for f in (np.sin, np.cos))
+    # Radii of curvature of the prime vertical and of the meridian.
+    across = _RADIUS_M / math.sqrt(1 - _ECCENTRICITY2 * sine**2)
+    along = across * (1 - _ECCENTRICITY2) / (1 - _ECCENTRICITY2 * sine**2)
+    degree = math.radians(1)
+    return degree * across * max(cosine, _LEAST_SHRINK), degree * along
 
 
 def _degrees_per_unit(crs: CRS) -> float:

@@ -15,7 +15,7 @@ from ..geometry.transform import FloatArray, Transform
 from ..kinds import AUTO
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_raster, write_with_geotransform
-from ..rasters.grid import Grid, PointFunction, near_longitude, reproject
+from ..rasters.grid import Grid, PointFunction, mesh, near_longitude, reproject
 from ..rasters.reading import Mask, RasterSource
 from ..rasters.target_grids import registered_grid
 from ..rasters.vrt import SUFFIX as VRT
@@ -138,7 +138,10 @@ class BeyondOverlap:
         """
         if grid == REFERENCE_GRID:
             return None
-        xy = transform.inverse(transform.input_grid.places(_PLACES))
+        # In the middles of equal parts: places on the border would count it as an area.
+        along = (np.arange(_PLACES) + 0.5) / _PLACES
+        px = mesh(*(along * side - 0.5 for side in transform.input_grid.size))
+        xy = transform.inverse(px)
         share = 1 - float(is_checked(xy).mean())
         return cls(share, transform.model.kind) if share >= _LEAST_BEYOND else None
 

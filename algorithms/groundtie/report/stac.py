@@ -62,13 +62,16 @@ def stac_item(
     time = time or time_of(file_name(source.path))
     if time is None or grid.crs is None:
         return {}
-    corners = grid.pixel_to_map(grid.outline(1))
-    seen = reproject(corners, grid.crs, LON_LAT)
+    # Many points: straight borders on the map are curved in longitude and latitude.
+    seen = reproject(grid.pixel_to_map(grid.outline()), grid.crs, LON_LAT)
     places = near_longitude(seen, 0.0, LON_LAT)
     longitudes = [seen[:, 0], places[:, 0]]
     if not np.isfinite(places).all() or np.ptp(longitudes, axis=1).max() > _MOST_DEGREES:
         return {}
-    ring = places.tolist()
+    # GeoJSON's outer rings run counterclockwise (RFC 7946, section 3.1.6).
+    x, y = (places - places.mean(axis=0)).T
+    is_clockwise = x @ np.roll(y, -1) < y @ np.roll(x, -1)
+    ring = places[:: -1 if is_clockwise else 1].tolist()
     return {
         "type": "Feature",
         "stac_version": VERSION,
