@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from benchmarks.accuracy import CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG
 from benchmarks.attacks import cases as attack_cases
@@ -20,7 +21,7 @@ from benchmarks.attacks.cases import ATTACKS, AttackCase, cases, judge, named
 from benchmarks.attacks.catalogue import CONTROLS, EXAMPLES, LOCKED, Attack, Setting
 from benchmarks.attacks.effects import OF_THE_ARRAY
 from benchmarks.attacks.overlays import OVERLAYS, Overlay
-from benchmarks.attacks.pairs import Pair, Source
+from benchmarks.attacks.pairs import Pair, Source, pixels
 from benchmarks.attacks.scenes import Scene, scenes
 from benchmarks.attacks.sensors import SensorCase
 from benchmarks.suites import Settings
@@ -222,6 +223,32 @@ def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
     made = ground.self_copy(pair, setting())
     assert made.input.shape[0] == 3
     assert sum(np.array_equal(band, made.reference[0]) for band in made.input) == 1
+
+
+def test_images_of_one_speckle_filter_share_its_texture_over_displaced_ground() -> None:
+    """Each date keeps its local mean, and takes the texture of all dates (Quegan and Yu 2001)."""
+    radar = Made("made-radar", "sar-sar", number=5).pair(1, Path())
+    made = ground.filtered_stack(radar, setting())
+    shift = pixels(made.size)[150, 150] - made.shown[150, 150]
+    assert 5.0 <= np.hypot(*shift) <= 12.0
+    # Without detail below the filter's window, the input shows the ground at its true place.
+    coarse = replace(
+        made,
+        **{
+            key: cv2.blur(getattr(made, key)[0].astype(float), (25, 25))[None]
+            for key in ("reference", "input")
+        },
+    )
+    at_truth = agreement(coarse)[1]
+    nominal = np.where(np.isfinite(made.shown), pixels(made.size), np.nan)
+    assert at_truth < 0.5 * agreement(replace(coarse, shown=nominal))[1]
+    # The detail lies at the same pixels of both.
+    held = ndimage.binary_erosion((made.input[0] > 0) & (made.reference[0] > 0), np.ones((25, 25)))
+    fine = [
+        np.log(image[0].astype(float)) - cv2.blur(np.log(image[0].astype(float)), (5, 5))
+        for image in (np.maximum(made.reference, 1), np.maximum(made.input, 1))
+    ]
+    assert np.corrcoef(fine[0][held], fine[1][held])[0, 1] > 0.8
 
 
 @pytest.mark.slow
