@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from benchmarks.accuracy import CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG
 from benchmarks.attacks import cases as attack_cases
-from benchmarks.attacks import ground, locked, parts, placement, suite
+from benchmarks.attacks import ground, locked, parts, placement, repetition, suite
 from benchmarks.attacks.cases import ATTACKS, AttackCase, cases, judge, named
 from benchmarks.attacks.catalogue import CONTROLS, EXAMPLES, LOCKED, Attack, Setting
 from benchmarks.attacks.effects import OF_THE_ARRAY
@@ -249,6 +249,49 @@ def test_images_of_one_speckle_filter_share_its_texture_over_displaced_ground() 
         for image in (np.maximum(made.reference, 1), np.maximum(made.input, 1))
     ]
     assert np.corrcoef(fine[0][held], fine[1][held])[0, 1] > 0.8
+
+
+def test_fields_of_a_survey_grid_lie_half_a_mile_apart() -> None:
+    """Roads follow every other line; a date sows other crops within the same borders."""
+    quarter_px, at = 40.0, pixels((400, 300))
+    (once, road), (again, same) = (
+        repetition.survey_grid(at, quarter_px, np.random.default_rng(1), np.random.default_rng(n))
+        for n in (2, 3)
+    )
+    np.testing.assert_array_equal(road, same)
+    assert np.mean(once == again) < 0.01
+    # Crops of two dates agree in where they change, not in brightness.
+    assert abs(np.corrcoef(once.ravel(), again.ravel())[0, 1]) < 0.3
+    edges = [np.abs(np.diff(image, axis=1)) > 0 for image in (once, again)]
+    assert np.mean(edges[0] == edges[1]) > 0.99
+    # The roads' mean profile repeats after a section, two quarters.
+    profile = road.mean(axis=0) - road.mean()
+    lags = [float(profile[:-lag] @ profile[lag:]) for lag in range(60, 101)]
+    assert 60 + int(np.argmax(lags)) == pytest.approx(2 * quarter_px, abs=1)
+    # Another place has another grid.
+    other = repetition.survey_grid(
+        at, quarter_px, np.random.default_rng(4), np.random.default_rng(2)
+    )
+    assert np.corrcoef(other[1].ravel(), road.ravel())[0, 1] < 0.5
+
+
+def test_borders_of_fields_lie_where_the_truth_says(pair: Pair) -> None:
+    made = repetition.fields(False)(pair, setting())
+    assert made.reference_transform.a in (10.0, 15.0, 20.0, 30.0)
+    known = ndimage.binary_erosion(made.input[0] > 0, np.ones((9, 9)))
+    borders = [
+        ndimage.gaussian_gradient_magnitude(image[0].astype(float), 1.0)
+        for image in (made.reference, made.input)
+    ]
+
+    def alike(shown: np.ndarray) -> float:
+        at = np.nan_to_num(shown, nan=-10).astype(np.float32)
+        seen = cv2.remap(borders[0], at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        inside = known & (at > 5).all(axis=-1) & (at < np.array(made.size) - 6).all(axis=-1)
+        return float(np.corrcoef(seen[inside], borders[1][inside])[0, 1])
+
+    assert alike(made.shown) > alike(made.shown + 5.0) + 0.3
+    assert np.isnan(repetition.fields(True)(pair, setting()).shown).all()
 
 
 @pytest.mark.slow
