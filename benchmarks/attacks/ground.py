@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..accuracy import FloatArray
 from ..cases import SAR_OPTICAL
 from ..series_scenes import aged
 from .catalogue import CONTROLS, GROUND, Attack, Make, Setting, as_text, direction, resampled
@@ -177,6 +178,34 @@ def half_transparent_copy(is_resampled: bool) -> Make:
     return make
 
 
+def filtered_stack(pair: Pair, setting: Setting) -> Pair:
+    """Both images come from one multitemporal speckle filter; the stack was not coregistered.
+
+    The filter of Quegan and Yu (2001) multiplies the local mean of each image by the mean of all
+    images' ratios to their local means. All dates but the input lie at the reference's place.
+    """
+    rng = setting.rng
+    shift = direction(rng, 5.0, 12.0)
+    moved = pair.moved(shift, as_text(shift))
+    number, window = int(rng.integers(4, 13)), int(rng.choice([5, 7, 9, 11]))
+    looks = rng.uniform(1.0, 4.0)
+
+    def local_mean(power: FloatArray) -> FloatArray:
+        return np.asarray(cv2.blur(power, (window, window)))
+
+    reference, image = ((one.mean(axis=0) / 255.0) ** 2 for one in (moved.reference, moved.input))
+    ground = cv2.GaussianBlur(reference, (0, 0), 1.0)
+    others = (ground * rng.gamma(looks, 1 / looks, ground.shape) for _ in range(number - 2))
+    ratio = np.mean([power / local_mean(power) for power in (reference, image, *others)], axis=0)
+
+    def filtered(power: FloatArray) -> Image:
+        return to_bytes(255.0 * np.sqrt(local_mean(power) * ratio))[None]
+
+    made = filtered(reference), filtered(image)
+    note = f"{number} dates, window of {window} px"
+    return moved.changed(lambda _: made[0], lambda _: made[1], note)
+
+
 def alpha_band(pair: Pair, setting: Setting) -> Pair:
     """Append the same opacity band to both images; the ground is displaced."""
     rng, shape = setting.rng, pair.input.shape[1:]
@@ -191,6 +220,11 @@ def alpha_band(pair: Pair, setting: Setting) -> Pair:
 def no_radar_input(scene: Scene) -> bool:
     """Whether the input is a camera image."""
     return scene.kind != SAR_SAR
+
+
+def radar_only(scene: Scene) -> bool:
+    """Whether both images are radar images."""
+    return scene.kind == SAR_SAR
 
 
 def camera_only(scene: Scene) -> bool:
@@ -209,6 +243,8 @@ ATTACKS = [
     Attack(GROUND, "reference in one band", "resampled", resampled(self_copy)),
     Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),
     Attack(GROUND, "reference shines through", "resampled", half_transparent_copy(True)),
+    Attack(GROUND, "speckle filter of a stack", "", filtered_stack, radar_only),
+    Attack(GROUND, "speckle filter of a stack", "resampled", resampled(filtered_stack), radar_only),
     Attack(GROUND, "band of opacity", "", alpha_band),
     Attack(CONTROLS, "two dates of one camera", "", two_dates, camera_only),
     Attack(CONTROLS, "two dates of one camera", "resampled", resampled(two_dates), camera_only),

@@ -6,12 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from affine import Affine
+
+from groundtie.rasters.grid import compose
 
 from ..accuracy import FloatArray
-from ..cases import SAR_OPTICAL
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL
 from .catalogue import REPETITION, Attack, Make, Setting, as_text, direction
 from .overlays import smooth_noise
-from .pairs import Image, Pair, join, pixels, render, to_bytes
+from .pairs import Change, Image, Pair, join, pixels, render, to_bytes
 from .scenes import SAR_SAR
 
 # Takes positions along and across the rows, in periods; returns the brightness, from 0 to 1.
@@ -19,6 +22,9 @@ Pattern = Callable[[FloatArray, FloatArray], FloatArray]
 
 # Range of the period in pixels.
 _PERIODS = {"orchard": (10, 18), "vineyard": (4, 9), "blocks": (28, 48), "panels": (9, 16)}
+
+# Half a mile, the side of a quarter section; and the number of different ones in a row.
+_QUARTER_M, _QUARTERS = 804.67, 64
 
 # The least search radius of any tool.
 _LEAST_RADIUS_PX = 3.0
@@ -130,7 +136,84 @@ def repeated_patch(pair: Pair, setting: Setting) -> Pair:
     return made.within(max(float(rng.choice(radii)), _LEAST_RADIUS_PX))
 
 
+def survey_grid(
+    px: FloatArray, quarter_px: float, grids: np.random.Generator, crops: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return fields of a land survey's grid and the opacity of its roads, at positions (col, row).
+
+    Quarter sections of half a mile hold fields of centre pivots, or strips; roads follow the
+    sections' borders, every other line.
+
+    Parameters
+    ----------
+    px
+        Positions, shape (rows, columns, 2).
+    quarter_px
+        Side of a quarter section.
+    grids, crops
+        What belongs to the place, and to the date.
+    """
+    turn = np.deg2rad(grids.uniform(-0.6, 0.6))
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    at = px @ axes / quarter_px + grids.uniform(0, 2, 2)
+    quarter, inside = np.floor(at), at % 1 - 0.5
+    column, row = np.moveaxis(quarter.astype(int) % _QUARTERS, -1, 0)
+    table = _QUARTERS, _QUARTERS
+    use, radius, start = (
+        grids.uniform(*limits, table)[row, column]
+        for limits in ((0, 1), (0.43, 0.49), (-np.pi, np.pi))
+    )
+    first, second, corners = (
+        crops.uniform(*limits, table)[row, column] for limits in ((60, 190), (60, 190), (100, 170))
+    )
+    angle = np.arctan2(inside[..., 1], inside[..., 0])
+    sown = np.where((use > 0.6) & (np.cos(angle - start) > 0), second, first)
+    strips = np.where(np.floor(4 * inside[..., 0]) % 2 == 0, first, second)
+    pivot = np.where(np.hypot(*np.moveaxis(inside, -1, 0)) < radius, sown, corners)
+    away_px = (quarter_px * np.abs(at - 2 * np.rint(at / 2))).min(axis=-1)
+    road = 0.7 * np.exp(-0.5 * (away_px / 0.7) ** 2)
+    return np.where(use < 0.2, strips, pivot), road
+
+
+def fields(is_elsewhere: bool, is_far: bool = False) -> Make:
+    """Cover the scene with the fields of a land survey's grid, sown anew between the dates.
+
+    The ground is displaced by up to 20 px, or by up to about a quarter section.
+    """
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        rng = setting.rng
+        metres = float(rng.choice([10.0, 15.0, 20.0, 30.0]))
+        quarter_px = _QUARTER_M / metres
+        low, high = (0.5 * quarter_px, 1.1 * quarter_px) if is_far else (0.0, 20.0)
+        shift = direction(rng, low, high)
+        place = compose(REFERENCE_TRANSFORM, Affine.scale(metres))
+        made = setting.elsewhere(pair) if is_elsewhere else pair.moved(shift, as_text(shift))
+        seeds = rng.integers(2**31, size=2)
+        where = (pixels(pair.size), pixels(pair.size) if is_elsewhere else made.shown)
+        radar = pair.kind in (SAR_OPTICAL, SAR_SAR), pair.kind == SAR_SAR
+
+        def covered(number: int) -> Change:
+            grids = np.random.default_rng(seeds[number if is_elsewhere else 0])
+            at = np.nan_to_num(where[number], nan=-1e4)
+            sown, road = survey_grid(at, quarter_px, grids, rng)
+            sown = (1 - road) * sown + road * (50 if radar[number] else 215)
+            looks = rng.gamma(4.0, 1 / 4.0, sown.shape)
+            speckle = np.sqrt(looks) if radar[number] else 1.0
+            # A quarter of the contrast of the ground below remains.
+            return lambda image: to_bytes(sown * speckle + (image - image.mean()) / 4)
+
+        note = f"quarter sections of {quarter_px:.0f} px"
+        made = replace(made, reference_transform=place, input_transform=place)
+        return made.changed(covered(0), covered(1), note)
+
+    return make
+
+
 ATTACKS = [
     *(Attack(REPETITION, name, "", repeating(name)) for name in _PATTERNS),
     Attack(REPETITION, "the same patch all over", "", repeated_patch),
+    Attack(REPETITION, "fields of a survey grid", "", fields(False)),
+    Attack(REPETITION, "fields of a survey grid", "half a mile off", fields(False, is_far=True)),
+    Attack(REPETITION, "fields of a survey grid", "other place", fields(True)),
 ]

@@ -12,15 +12,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from benchmarks.accuracy import CORRECT, INACCURATE, REFUSED, SILENTLY_WRONG
 from benchmarks.attacks import cases as attack_cases
-from benchmarks.attacks import ground, locked, parts, placement, suite
+from benchmarks.attacks import ground, locked, parts, placement, repetition, suite
 from benchmarks.attacks.cases import ATTACKS, AttackCase, cases, judge, named
 from benchmarks.attacks.catalogue import CONTROLS, EXAMPLES, LOCKED, Attack, Setting
 from benchmarks.attacks.effects import OF_THE_ARRAY
 from benchmarks.attacks.overlays import OVERLAYS, Overlay
-from benchmarks.attacks.pairs import Pair, Source
+from benchmarks.attacks.pairs import Pair, Source, pixels
 from benchmarks.attacks.scenes import Scene, scenes
 from benchmarks.attacks.sensors import SensorCase
 from benchmarks.suites import Settings
@@ -222,6 +223,75 @@ def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
     made = ground.self_copy(pair, setting())
     assert made.input.shape[0] == 3
     assert sum(np.array_equal(band, made.reference[0]) for band in made.input) == 1
+
+
+def test_images_of_one_speckle_filter_share_its_texture_over_displaced_ground() -> None:
+    """Each date keeps its local mean, and takes the texture of all dates (Quegan and Yu 2001)."""
+    radar = Made("made-radar", "sar-sar", number=5).pair(1, Path())
+    made = ground.filtered_stack(radar, setting())
+    shift = pixels(made.size)[150, 150] - made.shown[150, 150]
+    assert 5.0 <= np.hypot(*shift) <= 12.0
+    # Without detail below the filter's window, the input shows the ground at its true place.
+    coarse = replace(
+        made,
+        **{
+            key: cv2.blur(getattr(made, key)[0].astype(float), (25, 25))[None]
+            for key in ("reference", "input")
+        },
+    )
+    at_truth = agreement(coarse)[1]
+    nominal = np.where(np.isfinite(made.shown), pixels(made.size), np.nan)
+    assert at_truth < 0.5 * agreement(replace(coarse, shown=nominal))[1]
+    # The detail lies at the same pixels of both.
+    held = ndimage.binary_erosion((made.input[0] > 0) & (made.reference[0] > 0), np.ones((25, 25)))
+    fine = [
+        np.log(image[0].astype(float)) - cv2.blur(np.log(image[0].astype(float)), (5, 5))
+        for image in (np.maximum(made.reference, 1), np.maximum(made.input, 1))
+    ]
+    assert np.corrcoef(fine[0][held], fine[1][held])[0, 1] > 0.8
+
+
+def test_fields_of_a_survey_grid_lie_half_a_mile_apart() -> None:
+    """Roads follow every other line; a date sows other crops within the same borders."""
+    quarter_px, at = 40.0, pixels((400, 300))
+    (once, road), (again, same) = (
+        repetition.survey_grid(at, quarter_px, np.random.default_rng(1), np.random.default_rng(n))
+        for n in (2, 3)
+    )
+    np.testing.assert_array_equal(road, same)
+    assert np.mean(once == again) < 0.01
+    # Crops of two dates agree in where they change, not in brightness.
+    assert abs(np.corrcoef(once.ravel(), again.ravel())[0, 1]) < 0.3
+    edges = [np.abs(np.diff(image, axis=1)) > 0 for image in (once, again)]
+    assert np.mean(edges[0] == edges[1]) > 0.99
+    # The roads' mean profile repeats after a section, two quarters.
+    profile = road.mean(axis=0) - road.mean()
+    lags = [float(profile[:-lag] @ profile[lag:]) for lag in range(60, 101)]
+    assert 60 + int(np.argmax(lags)) == pytest.approx(2 * quarter_px, abs=1)
+    # Another place has another grid.
+    other = repetition.survey_grid(
+        at, quarter_px, np.random.default_rng(4), np.random.default_rng(2)
+    )
+    assert np.corrcoef(other[1].ravel(), road.ravel())[0, 1] < 0.5
+
+
+def test_borders_of_fields_lie_where_the_truth_says(pair: Pair) -> None:
+    made = repetition.fields(False)(pair, setting())
+    assert made.reference_transform.a in (10.0, 15.0, 20.0, 30.0)
+    known = ndimage.binary_erosion(made.input[0] > 0, np.ones((9, 9)))
+    borders = [
+        ndimage.gaussian_gradient_magnitude(image[0].astype(float), 1.0)
+        for image in (made.reference, made.input)
+    ]
+
+    def alike(shown: np.ndarray) -> float:
+        at = np.nan_to_num(shown, nan=-10).astype(np.float32)
+        seen = cv2.remap(borders[0], at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        inside = known & (at > 5).all(axis=-1) & (at < np.array(made.size) - 6).all(axis=-1)
+        return float(np.corrcoef(seen[inside], borders[1][inside])[0, 1])
+
+    assert alike(made.shown) > alike(made.shown + 5.0) + 0.3
+    assert np.isnan(repetition.fields(True)(pair, setting()).shown).all()
 
 
 @pytest.mark.slow
