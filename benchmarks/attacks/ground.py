@@ -181,8 +181,8 @@ def half_transparent_copy(is_resampled: bool) -> Make:
 def filtered_stack(pair: Pair, setting: Setting) -> Pair:
     """Both images come from one multitemporal speckle filter; the stack was not coregistered.
 
-    The filter of Quegan and Yu (2001) multiplies the local mean of each image by the mean of all
-    images' ratios to their local means. All dates but the input lie at the reference's place.
+    The filter [Quegan2001] multiplies the local mean of each image by the mean of all images'
+    ratios to their local means. All dates but the input lie at the reference's place.
     """
     rng = setting.rng
     shift = direction(rng, 5.0, 12.0)

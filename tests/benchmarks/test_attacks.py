@@ -226,7 +226,7 @@ def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
 
 
 def test_images_of_one_speckle_filter_share_its_texture_over_displaced_ground() -> None:
-    """Each date keeps its local mean, and takes the texture of all dates (Quegan and Yu 2001)."""
+    """Each date keeps its local mean, and takes the texture of all dates [Quegan2001]."""
     radar = Made("made-radar", "sar-sar", number=5).pair(1, Path())
     made = ground.filtered_stack(radar, setting())
     shift = pixels(made.size)[150, 150] - made.shown[150, 150]
