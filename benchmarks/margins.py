@@ -93,6 +93,11 @@ def _rest_height(evidence: RegistrationEvidence) -> float:
     return math.nan if is_nothing else left.height
 
 
+def _share_far_off(evidence: RegistrationEvidence) -> float:
+    far = evidence.surveys.far
+    return math.nan if far is None else far.height / max(far.own_height, 0.1)
+
+
 def _rest_peak(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
@@ -125,6 +130,11 @@ STATISTICS = (
         "second place: share of the height",
         RIVAL_HEIGHT,
         _of_survey(lambda s: s.rival_height / max(s.height, 0.1)),
+    ),
+    Statistic(
+        "second place far off: share of the height",
+        RIVAL_HEIGHT,
+        _share_far_off,
     ),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),

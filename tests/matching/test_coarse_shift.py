@@ -19,6 +19,7 @@ from groundtie.matching import coarse_shift
 from groundtie.matching.coarse_shift import (
     Candidate,
     coarse_candidates,
+    far_place,
     level_factor,
 )
 from groundtie.pose.pose import Pose, PoseFound
@@ -60,6 +61,40 @@ def test_candidates_on_a_coarser_level_are_in_map_units(pair: ImagePair, context
     level = pair.grid.scaled(2)
     found = candidates(pair, level, SearchLimits(140.0), context)
     assert shift_m(found[0]) == pytest.approx((70, -45), abs=6)
+
+
+@pytest.mark.parametrize(("side", "period"), [(400, 40), (800, 64)])
+def test_what_repeats_matches_as_well_some_periods_off(
+    side: int, period: int, tmp_path: Path, context: Context
+) -> None:
+    """Also if something else was sown in each field, and beyond what is reduced for the search."""
+    rng = np.random.default_rng(1)
+    fields = side // period + 1
+    paths = []
+    for name in ("one", "other"):
+        sown = np.kron(rng.uniform(200, 900, (fields, fields)), np.ones((period, period)))
+        grown = sown[:side, :side] + rng.normal(0, 20, (side, side))
+        paths.append(write_raster(tmp_path / f"{name}.tif", grown.astype(np.uint16)))
+    with open_raster(paths[0]) as reference, open_raster(paths[1]) as input:
+        found = far_place(
+            make_pair(Image(reference), Image(input)), shift_model(0.0, 0.0), 24.0, context
+        )
+    assert found.is_rival
+    # Along columns and rows whole periods, so that squares of distances are sums of two squares.
+    periods2 = (found.distance_px / period) ** 2
+    sums = np.add.outer(np.arange(10) ** 2, np.arange(10) ** 2)
+    assert np.abs(np.sqrt(sums) - np.sqrt(periods2)).min() * period < 2.5
+
+
+def test_what_does_not_repeat_matches_at_the_truth_alone(
+    textured: TexturedPair, pair: ImagePair, context: Context
+) -> None:
+    assert not far_place(pair, textured.truth.model, 24.0, context).is_rival
+    # At a wrong model, the truth is the far place.
+    wrong = shift_model(*(np.array([70.0, -45.0]) + [400.0, 0.0]))
+    found = far_place(pair, wrong, 24.0, context)
+    assert found.is_rival
+    assert found.distance_px == pytest.approx(40.0, abs=2.0)
 
 
 def test_low_candidates_of_any_search_are_left_out(

@@ -8,18 +8,20 @@ import numpy as np
 
 from ..context import Context
 from ..geometry.fitting import fit_model
+from ..geometry.judging import RIVAL_HEIGHT
 from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
-from ..pose.rotation_windows import read_windows
+from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, read_windows
 from ..pose.search import find_poses
 from ..rasters.grid import Grid, near_longitude
+from ..rasters.held_images import held_on_level
 from ..rasters.pair import Image, ImagePair, require_content
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP
 from ..similarity.description import BORDER_PX
 from ..similarity.peak import Peak, find_peak
 from ..similarity.peaks import suppress
-from ..similarity.surface import SimilaritySettings, describe, similarity_surface
+from ..similarity.surface import SimilaritySettings, Surface, describe, similarity_surface
 from .frames import compose
 from .matcher import MaskOf
 
@@ -33,6 +35,9 @@ _LOW = 0.4
 # Candidates nearer than this are the same, in pixels of the level.
 _SAME_PLACE = np.ones((2 * 4 + 1,) * 2, bool)
 
+# What a scene that repeats has in common with itself, whatever grows there: borders and roads.
+_EDGES = SimilaritySettings("orientation")
+
 # Few bins keep counting over a large search window fast, and are enough for whole scenes.
 _BINS = 8
 
@@ -43,6 +48,28 @@ class Candidate:
 
     model: Model
     height: float
+
+
+@dataclass(frozen=True)
+class FarPlace:
+    """The best match of a whole pair far from a model, beside the model's own.
+
+    Parameters
+    ----------
+    own_height, height
+        Similarity at the model and at the far place, in robust standard deviations.
+    distance_px
+        Distance of the far place, in pixels of the matching grid.
+    """
+
+    own_height: float
+    height: float = 0.0
+    distance_px: float = 0.0
+
+    @property
+    def is_rival(self) -> bool:
+        """Whether the pair matches about as well there."""
+        return self.height >= RIVAL_HEIGHT * self.own_height
 
 
 def level_factor(grid: Grid) -> float:
@@ -138,18 +165,7 @@ def _places(
     radius_px = int(np.ceil(pair.limits.radius / min(level.pixel_sides_m))) + 1
     # At larger shifts the images overlap too little.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
-    reach = radius_px + BORDER_PX
-    reference, input = _patches(pair, level, model, reach, held_out, context)
-    # Only the unmasked share of the input can overlap with the reference.
-    valid = 1.0 if pair.input.mask is None else input.valid_share
-    surface = similarity_surface(
-        describe(reference, level.width * level.height, settings, context.memo),
-        describe(input, level.width * level.height, settings),
-        radius_px,
-        settings,
-        context.quiet(),
-        MINIMUM_OVERLAP * valid,
-    )
+    surface = _surface(pair, level, settings, held_out, context, model, radius_px)
     found: list[Peak] = []
     for _ in range(MOST_CANDIDATES):
         peak = find_peak(surface)
@@ -159,6 +175,62 @@ def _places(
         x, y = peak.shift_px
         suppress(surface, (round(y) + radius_px, round(x) + radius_px), _SAME_PLACE)
     return found
+
+
+def far_place(pair: ImagePair, model: Model, beyond_px: float, context: Context) -> FarPlace:
+    """Return where a whole pair matches best far from a model, by the orientation of its edges.
+
+    Shifts of up to a quarter of the longer side are compared.
+
+    Parameters
+    ----------
+    pair
+        The images.
+    model
+        The misregistration on the map.
+    beyond_px
+        Nearer places do not count, in pixels of the matching grid.
+    context
+        Threads.
+    """
+    factor = level_factor(pair.grid)
+    level = pair.grid.scaled(factor)
+    held = held_on_level(pair, level, context)
+    radius_px = int(DEFAULT_RADIUS_SHARE * max(level.size))
+    surface = _surface(held, level, _EDGES, None, context, model, radius_px)
+    shifts = np.arange(-radius_px, radius_px + 1)
+    distance_px = np.hypot(*np.meshgrid(shifts, shifts))
+    same_px = _SAME_PLACE.shape[0] // 2
+    own = float(surface[distance_px <= same_px].max())
+    is_far = distance_px > max(beyond_px / factor, 2 * same_px)
+    at = np.argmax(np.where(is_far, surface, -np.inf))
+    if not is_far.flat[at]:
+        return FarPlace(own)
+    return FarPlace(own, float(surface.flat[at]), float(distance_px.flat[at]) * factor)
+
+
+def _surface(
+    pair: ImagePair,
+    level: Grid,
+    settings: SimilaritySettings,
+    held_out: MaskOf | None,
+    context: Context,
+    model: Model,
+    radius_px: int,
+) -> Surface:
+    """Return the similarity of a whole pair at shifts of up to a radius relative to a model."""
+    reach = radius_px + BORDER_PX
+    reference, input = _patches(pair, level, model, reach, held_out, context)
+    # Only the unmasked share of the input can overlap with the reference.
+    valid = 1.0 if pair.input.mask is None else input.valid_share
+    return similarity_surface(
+        describe(reference, level.width * level.height, settings, context.memo),
+        describe(input, level.width * level.height, settings),
+        radius_px,
+        settings,
+        context.quiet(),
+        MINIMUM_OVERLAP * valid,
+    )
 
 
 def _patches(

@@ -10,6 +10,7 @@ from ..geometry.transform import Transform
 from ..similarity.surface import SimilaritySettings
 from .chip_windows import Resampled
 from .chips import ChipMatcher
+from .coarse_shift import FarPlace
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
 from .parts import Part
@@ -64,6 +65,10 @@ class Surveys:
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
         Of the part of the input that the reference does not explain; None: as `rest`.
+    far
+        Where the whole pair matches best beyond the surveys' radius; None: it is not compared,
+        because one image is rendered, only ground takes part, or a pose was searched for, which is
+        compared with others by itself.
     """
 
     whole: Survey | None = None
@@ -71,6 +76,7 @@ class Surveys:
     ground: Survey | None = None
     fine: Survey | None = None
     unexplained: Survey | None = None
+    far: FarPlace | None = None
 
     @property
     def parts(self) -> Sequence[Part]:

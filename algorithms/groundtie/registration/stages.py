@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ..context import Context
@@ -15,6 +15,7 @@ from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import Check, check_model
 from ..matching.chips import ChipMatcher
+from ..matching.coarse_shift import far_place
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import GuidedFit, KeypointFit
 from ..matching.keypoints import KeypointMatcher
@@ -24,7 +25,7 @@ from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
 from ..matching.shared_content import Sensors
 from ..matching.surface_fit import SurfaceFit, SurfaceMatcher
-from ..matching.survey import survey_places
+from ..matching.survey import SURVEY_RADIUS_PX, survey_places
 from ..matching.surveys import Surveys, survey_all
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -126,15 +127,19 @@ class Stages:
         if self.spec.is_placed:
             return Surveys()
         chips = ChipMatcher(self.masked.pair, SimilaritySettings(self.spec.similarity))
-        return survey_all(
+        surveys = survey_all(
             chips,
             estimate.transform,
             survey_places(chips.pair.grid),
             (ELSEWHERE_PX, EXACT_PX),
             None if self.spec.is_rendered else self.masked.scene.sensors,
             self.masked.scene.open_ground if self.masked.used.kind == NONE else None,
-            context,
+            context.part(0.0, 0.9),
         )
+        if self.spec.is_rendered or self.masked.used.is_ground:
+            return surveys
+        model, quiet = estimate.transform.model, context.quiet()
+        return replace(surveys, far=far_place(chips.pair, model, SURVEY_RADIUS_PX, quiet))
 
     def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
         """Return the evidence for the rules."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 # 29 real pairs (correct poses: height ≥ 6.2, ratio ≥ 1.8) and 115 pairs of different places (where
 # the height passed: ratio ≤ 1.45; suite rotated_pairs). Poses are the same if they place the
 # reference's corners apart by no more than `SAME_SHARE` of its longer side.
-_LEAST_HEIGHT = 5.0
+LEAST_HEIGHT = 5.0
 _LEAST_RIVAL_RATIO = 1.6
 SAME_SHARE = 0.02
 
@@ -23,7 +23,7 @@ def _no_pose(evidence: PoseEvidence) -> str | None:
         return "nothing in common was found"
     if evidence.rival_ratio is None:
         return "the images hold too little to judge by"
-    if evidence.height < _LEAST_HEIGHT:
+    if evidence.height < LEAST_HEIGHT:
         return f"the best pose is no higher than chance ({evidence.height:.1f})"
     return None
 
@@ -48,7 +48,7 @@ def _not_exhaustive(evidence: PoseEvidence) -> str | None:
 POSE_RULES: tuple[Rule, ...] = (
     Rule(
         "pose by chance",
-        f"the best rotation, scale and shift are less than {_LEAST_HEIGHT:g} robust standard "
+        f"the best rotation, scale and shift are less than {LEAST_HEIGHT:g} robust standard "
         "deviations above chance",
         "suite rotated_pairs",
         "check the band and the overlap; give wider limits of rotation, scale and shift",

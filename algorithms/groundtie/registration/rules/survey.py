@@ -14,6 +14,7 @@ from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
 from ...similarity.in_common import MOVED_GROUND_SHARE
 from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
+from .pose import LEAST_HEIGHT
 from .rule import ON_GROUND, WITHOUT, Rule
 
 # Mean similarity of the chips, in robust standard deviations, below which they match weakly.
@@ -68,6 +69,13 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     if evidence.mask.is_ground or not _has_rival(survey):
         return None
     return "chips all over match about as well if all of them are moved together to a second place"
+
+
+def _second_place_far_off(evidence: RegistrationEvidence) -> str | None:
+    far = evidence.surveys.far
+    if far is None or far.height < LEAST_HEIGHT or not far.is_rival:
+        return None
+    return f"the images match about as well {far.distance_px:.0f} px off as a whole"
 
 
 def _has_rival(survey: Survey) -> bool:
@@ -216,6 +224,18 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_nearby,
+        is_final=True,
+    ),
+    Rule(
+        "second place far off",
+        f"the orientation of edges of the whole overlap matches, more than {SURVEY_RADIUS_PX} px "
+        "and up to a quarter of its longer side off, at least "
+        f"{RIVAL_HEIGHT:g} times as well, and by {LEAST_HEIGHT:g} robust standard deviations, as "
+        "poses above chance do. Not asked of rendered images and where a mask leaves the ground "
+        "alone; poses are compared with others by *second pose*",
+        "suites real, rotated_pairs and attacks",
+        "give a larger part of the scene, which shows more than what repeats or is drawn over it",
+        _second_place_far_off,
         is_final=True,
     ),
     Rule(
