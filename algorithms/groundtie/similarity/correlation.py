@@ -24,21 +24,25 @@ MINIMUM_OVERLAP = 0.3
 _ROUNDING = math.sqrt(np.finfo(np.float32).eps)
 
 
-def correlate(template: NDArray[Any], search: NDArray[Any]) -> NDArray[np.float32]:
+def correlate(
+    template: NDArray[Any], search: NDArray[Any], workers: int = 1
+) -> NDArray[np.float32]:
     """Return Σ Re(conj(template) · search) at all shifts at which the template lies inside.
 
     Parameters
     ----------
     template, search
         Real or complex arrays, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
+    workers
+        Number of threads.
 
     Returns
     -------
     Array of shape (…, ny, nx), float32.
     """
     shape, (rows, cols) = fast_shape(search), spans(template, search)
-    product = spectrum(template, shape).conj() * spectrum(search, shape)
-    found = from_spectrum(product, shape, (rows, cols))
+    product = spectrum(template, shape, workers).conj() * spectrum(search, shape, workers)
+    found = from_spectrum(product, shape, (rows, cols), workers)
     return np.asarray(found.real, np.float32)
 
 
@@ -135,13 +139,13 @@ def overlap_share(template: Patch, search: Patch) -> NDArray[np.float32]:
     return _sums_where(template.valid, search.valid.astype(np.float32)) / count
 
 
-def _sums_where(valid: NDArray[np.bool_], images: FloatImage) -> FloatImage:
+def _sums_where(valid: NDArray[np.bool_], images: FloatImage, workers: int = 1) -> FloatImage:
     """Return the sums of images over the valid pixels of a template, at all of its shifts."""
     whole = valid.all(axis=(-2, -1), keepdims=True)
     sums = box_sums(images, *valid.shape[-2:])
-    return (
-        sums if whole.all() else np.where(whole, sums, correlate(valid.astype(np.float32), images))
-    )
+    if whole.all():
+        return sums
+    return np.where(whole, sums, correlate(valid.astype(np.float32), images, workers))
 
 
 def correlate_fields(
@@ -149,6 +153,7 @@ def correlate_fields(
     search: NDArray[np.complex64],
     template_valid: NDArray[np.bool_],
     search_valid: NDArray[np.bool_],
+    workers: int = 1,
 ) -> NDArray[np.float32]:
     """Return the correlation coefficients of complex fields over shifts, -1 to 1.
 
@@ -159,6 +164,8 @@ def correlate_fields(
         (n, …, h + ny - 1, w + nx - 1). Each shift is normalised by the energy of the overlap.
     template_valid, search_valid
         Validity of pixels, shapes (…, h, w) and (…, h + ny - 1, w + nx - 1).
+    workers
+        Number of threads.
 
     Returns
     -------
@@ -169,12 +176,12 @@ def correlate_fields(
     own_energy = template_energy.sum(axis=(-2, -1), keepdims=True)
     whole = search_valid.all(axis=(-2, -1), keepdims=True)
     if not whole.all():
-        seen = correlate(template_energy, search_valid.astype(np.float32))
+        seen = correlate(template_energy, search_valid.astype(np.float32), workers)
         own_energy = np.where(whole, own_energy, seen)
-    energy = _sums_where(template_valid, search_energy) * own_energy
+    energy = _sums_where(template_valid, search_energy, workers) * own_energy
     highest = energy.max(axis=(-2, -1), keepdims=True, initial=0)
     floor = np.float32(1e-6) * np.maximum(highest, np.float32(1e-12))
-    found = correlate(template, search) / np.sqrt(np.maximum(energy, floor))
+    found = correlate(template, search, workers) / np.sqrt(np.maximum(energy, floor))
     return np.where(energy > floor, found, 0).astype(np.float32)
 
 

@@ -79,7 +79,8 @@ def orientation(
 ) -> FloatArray:
     """Return the correlation of the orientation of edges, a surface for each scale."""
     valid = template.patch.valid, search.patch.valid
-    return correlate_fields(template.fields, search.fields, *valid)
+    workers = 1 if context is None else context.workers
+    return correlate_fields(template.fields, search.fields, *valid, workers)
 
 
 @measure("edge-strength")

@@ -156,7 +156,7 @@ def similarity_surface(
     settings
         Settings of the measurement.
     context
-        Threads to count histograms in; by default the calling thread alone.
+        Threads for whole scenes; by default the calling thread alone.
     least_overlap
         Share of the template's valid pixels that must lie on valid ones.
 
