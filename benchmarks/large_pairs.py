@@ -1,5 +1,7 @@
 """Pairs of any size, made by repeating one simulated square in files of their own.
 
+Every second copy is mirrored: a scene that repeats within a quarter of it is refused.
+
 The square's images are exactly aligned; only the georeferencing of the input is wrong. No pixel is
 resampled, and the truth is exact: each pixel of the input shows the ground of the same pixel of the
 reference.
@@ -13,6 +15,7 @@ import numpy as np
 import rasterio
 import rasterio.windows
 from affine import Affine
+from numpy.typing import NDArray
 
 from groundtie.rasters.grid import compose
 
@@ -37,7 +40,7 @@ def tile_pair(cache: Path) -> Pair:
 
 
 def large_pair(tile: Pair, size: int, folder: Path) -> Pair:
-    """Write a pair of `size`² pixels into a folder; the square is repeated, or cut."""
+    """Write a pair of `size`² pixels into a folder; the square is repeated in mirrors, or cut."""
     reference, input = folder / "reference.tif", folder / "input.tif"
     repeat(tile.reference, reference, size, Affine.identity())
     repeat(tile.input, input, size, wrong(size))
@@ -57,7 +60,7 @@ def wrong(size: int) -> Affine:
 
 
 def repeat(source: Path, target: Path, size: int, moved: Affine) -> None:
-    """Write a raster of `size`² pixels that repeats another raster, strip by strip.
+    """Write a raster of `size`² pixels of another raster and its mirror images, strip by strip.
 
     Parameters
     ----------
@@ -82,9 +85,15 @@ def repeat(source: Path, target: Path, size: int, moved: Affine) -> None:
         "num_threads": "all_cpus",
         "bigtiff": "if_safer",
     }
-    columns = np.arange(size) % image.shape[2]
+    columns = _mirrored(np.arange(size), image.shape[2])
     with rasterio.open(target, "w", **profile) as raster:
         for row in range(0, size, _BLOCK_PX):
-            rows = np.arange(row, min(row + _BLOCK_PX, size)) % image.shape[1]
+            rows = _mirrored(np.arange(row, min(row + _BLOCK_PX, size)), image.shape[1])
             window = rasterio.windows.Window(0, row, size, len(rows))
             raster.write(image[:, rows][:, :, columns], window=window)
+
+
+def _mirrored(positions: NDArray[np.int_], side: int) -> NDArray[np.int_]:
+    """Return where positions lie on a side that is followed by its mirror image, and so on."""
+    place = positions % (2 * side)
+    return np.minimum(place, 2 * side - 1 - place)
