@@ -1,4 +1,4 @@
-"""The coarse shift or pose, and places far from a model, by exhaustive search of a reduced image."""
+"""The coarse shift or pose, and places far from a model: exhaustive search of a reduced image."""
 
 from __future__ import annotations
 
