@@ -103,15 +103,17 @@ def ground_between_buildings(level_db: FloatImage, valid: Mask, pixel_m: float) 
     darkest, brightest = np.percentile(level[valid], [_DARK_PERCENT, 100 - _BRIGHT_PERCENT])
     dark, bright = (level < darkest) & valid, (level > brightest) & valid
     least_px = max(_GROUND_M / pixel_m, _GROUND_PX)
-    mean = np.ones(level.shape, np.float32)
+    # The sixth power of the mean distance, as a ratio to the least one.
+    mean6 = np.ones(level.shape, np.float32)
     for weight, px in (
         (2, distance_to_masked(~bright)),
         (2, distance_to_masked(~dark)),
         (1, distance_back_px(bright, azimuth_deg)),
         (1, distance_back_px(dark, azimuth_deg + 180)),
     ):
-        mean *= np.minimum(px / np.float32(least_px), np.float32(farthest_px / least_px)) ** weight
-    return np.asarray((mean >= 1) & valid)
+        ratio = np.minimum(px / np.float32(least_px), np.float32(farthest_px / least_px))
+        mean6 *= ratio**weight
+    return np.asarray((mean6 >= 1) & valid)
 
 
 def distance_back_px(mask: Mask, azimuth_deg: float) -> FloatImage:

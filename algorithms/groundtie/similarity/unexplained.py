@@ -14,8 +14,8 @@ from .stacks import each
 # mean), and narrow enough to follow changes of light.
 WINDOW_PX = 15
 
-# Windows of windows reach this far. Strips of so many rows stay in the processor's cache, which
-# halves the time that whole images take.
+# Windows of windows reach this far. Strips of so many rows, unlike whole images, fit into the
+# processor's cache.
 _REACH_PX, _STRIP_ROWS = 2 * (WINDOW_PX // 2), 128
 
 # A variance below this share of the mean square is rounding, and explains nothing.
