@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from contexts import context
 from facts_of_pairs import FIELDS, TOWN, opened
-from raster_files import write_raster
+from raster_files import utm_grid, write_raster
+from scipy.ndimage import gaussian_filter
 
+from groundtie import coregister
 from groundtie.context import Context
-from groundtie.errors import ParameterError
+from groundtie.errors import NotRegisteredError, ParameterError
 from groundtie.rasters.grid import Grid
 from groundtie.registration.asked import asked_masks
 from groundtie.registration.scene import SceneInfo
@@ -34,6 +36,42 @@ def half_cloudy(path: Path, grid: Grid) -> Path:
     values = np.full((grid.height, grid.width), 4, np.uint8)
     values[:, grid.width // 2 :] = 9
     return write_raster(path, values, grid)
+
+
+def rectangle(path: Path, grid: Grid, width: int, height: int) -> Path:
+    """Write a layer that covers so many pixels to the right of and below a grid's corner."""
+    corners = [[0, 0], [width, 0], [width, height], [0, height], [0, 0]]
+    ring = grid.pixel_to_map(np.array(corners) - 0.5).tolist()
+    polygon = {"type": "Polygon", "coordinates": [ring]}
+    feature = {"type": "Feature", "properties": {}, "geometry": polygon}
+    crs = {"type": "name", "properties": {"name": grid.crs.to_string()}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_masked", [False, True])
+def test_a_layer_over_all_does_not_hide_that_a_scene_repeats(
+    tmp_path: Path, is_masked: bool
+) -> None:
+    """A period of 100 px is seen, also under a mask that leaves it whole."""
+    rng = np.random.default_rng(0)
+    tiled = np.tile(gaussian_filter(rng.normal(size=(100, 100)), 2, mode="wrap"), (5, 5))
+    grid = utm_grid(480, 480)
+    files = [
+        write_raster(
+            tmp_path / f"{name}.tif",
+            (1000 + times * tiled[at : at + 480, at : at + 480] + rng.normal(0, 40, (480, 480)))
+            .clip(1)
+            .astype(np.uint16),
+            grid,
+        )
+        for name, at, times in (("reference", 0, 900), ("input", 5, -900))
+    ]
+    mask = rectangle(tmp_path / "all.geojson", grid, 480, 480) if is_masked else None
+    with pytest.raises(NotRegisteredError) as refused:
+        coregister(*files, None, reference_mask=mask)
+    assert refused.value.verdict.rule == "second place far off"
 
 
 def test_values_hide_clouds_and_say_nothing_of_the_ground(
@@ -57,15 +95,7 @@ def test_a_layer_may_show_what_takes_no_part(
     tmp_path: Path, stack: ExitStack, context: Context
 ) -> None:
     with opened(tmp_path, TOWN, FIELDS) as pair:
-        left, top = pair.grid.pixel_to_map([[-0.5, -0.5]])[0]
-        ring = [[left, top], [left + 200, top], [left + 200, top - 400], [left, top - 400]]
-        polygon = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
-        feature = {"type": "Feature", "properties": {}, "geometry": polygon}
-        crs = {"type": "name", "properties": {"name": pair.grid.crs.to_string()}}
-        layer = tmp_path / "clouds.geojson"
-        layer.write_text(
-            json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]})
-        )
+        layer = rectangle(tmp_path / "clouds.geojson", pair.grid, 200, 400)
         found = []
         for values in (None, "inside"):
             mask = UserMask.of("input.tif", layer, values)

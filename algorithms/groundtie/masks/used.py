@@ -14,7 +14,7 @@ LAYER, SURFACE = "layer", "surface"
 # If less than this share takes part, chips have too few pixels for a joint histogram of their own.
 # Up to 42 % of simulated cities is ground, in pixels of 2 m and 3 m. Median errors: 1.3 px with a
 # histogram for each chip, 0.5 px with a pooled histogram (suite calibration, class city, 2 m).
-_LITTLE = 0.5
+LITTLE_SHARE = 0.5
 
 REFERENCE, INPUT = "reference", "input"
 
@@ -60,7 +60,7 @@ class MaskUsed:
     @property
     def leaves_little(self) -> bool:
         """Whether too few pixels of a chip take part to match each chip by itself."""
-        return self.share < _LITTLE
+        return self.share < LITTLE_SHARE
 
     def summary(self) -> dict[str, Any]:
         """Return the mask as values that JSON can carry."""

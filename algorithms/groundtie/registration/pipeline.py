@@ -146,7 +146,7 @@ def _asks_for_exchange(evidence: RegistrationEvidence, spec: Specification) -> b
 
     An image that is rendered or located by a sensor model cannot be a reference for another one.
     """
-    if not evidence.needs_second_confirmation or evidence.mask.is_ground:
+    if not evidence.needs_second_confirmation or evidence.mask.leaves_little:
         return False
     is_plain = spec.surface is None and spec.dem is None and not spec.is_rendered
     return is_plain and not evidence.scene.input.is_in_sensor_geometry

@@ -136,7 +136,7 @@ class Stages:
             self.masked.scene.open_ground if self.masked.used.kind == NONE else None,
             context.part(0.0, 0.9),
         )
-        if self.spec.is_rendered or self.masked.used.is_ground:
+        if self.spec.is_rendered or self.masked.used.leaves_little:
             return surveys
         model, quiet = estimate.transform.model, context.quiet()
         return replace(surveys, far=far_place(chips.pair, model, SURVEY_RADIUS_PX, quiet))

@@ -9,7 +9,7 @@ from ...geometry.judging import (
     SMALLEST_SHARE_UNROTATED,
 )
 from ..evidence import EvidenceOfPoints, RegistrationEvidence
-from .rule import Rule
+from .rule import UNMASKED, Rule
 
 
 def _by_chance(evidence: EvidenceOfPoints) -> str | None:
@@ -64,9 +64,9 @@ AGREEMENT_RULES: tuple[Rule, ...] = (
     Rule(
         "exchanged roles",
         "the agreement of the check points has a probability by chance above "
-        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, no mask leaves the ground alone, and check points "
-        "that are matched with reference and input exchanged, around a coarse search of their own, "
-        "agree no better than by chance",
+        f"10^{2 * LARGEST_LOG10_CHANCE:.0f}, and check points that are matched with reference and "
+        "input exchanged, around a coarse search of their own, agree no better than by chance. "
+        f"Asked {UNMASKED}",
         "[Holden2000]; suite attacks",
         "give a larger part of the scene, or bands that show the same",
         _exchanged_roles,

@@ -6,8 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from ...masks.used import LITTLE_SHARE
+
 ON_GROUND = "give a mask of the ground, such as roads and waters"
 WITHOUT = "give images, or masks, without what is drawn over the ground"
+
+# Condition of rules that need chips with most of their pixels.
+UNMASKED = f"unless a ground mask leaves less than {LITTLE_SHARE:.0%}"
 
 
 @dataclass(frozen=True)

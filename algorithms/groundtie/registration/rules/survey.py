@@ -15,7 +15,7 @@ from ...similarity.in_common import MOVED_GROUND_SHARE
 from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
 from .pose import LEAST_HEIGHT
-from .rule import ON_GROUND, WITHOUT, Rule
+from .rule import ON_GROUND, UNMASKED, WITHOUT, Rule
 
 # Mean similarity of the chips, in robust standard deviations, below which they match weakly.
 # Measured: from 2.2 on for correctly registered pairs, 1.5 to 2.9 for very noisy images that were
@@ -66,7 +66,7 @@ def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
         return None
     if deviations_elsewhere(survey) >= PEAK_DEVIATIONS:
         return "chips all over match at a second place, too, if all of them are moved together"
-    if evidence.mask.is_ground or not _has_rival(survey):
+    if evidence.mask.leaves_little or not _has_rival(survey):
         return None
     return "chips all over match about as well if all of them are moved together to a second place"
 
@@ -98,7 +98,7 @@ def _weak(evidence: RegistrationEvidence) -> str | None:
     chips = len(survey.centres)
     if has_few_chips(survey, chips):
         return f"only {survey.comparable} of {chips} chips overlap with the registered input"
-    if evidence.mask.is_ground or survey.height >= WEAK_HEIGHT:
+    if evidence.mask.leaves_little or survey.height >= WEAK_HEIGHT:
         return None
     return (
         f"only {survey.confirming} of {chips} chips all over confirm the transform, "
@@ -189,7 +189,7 @@ def height_of_else(rest: Rest | None) -> float:
 
 def _nothing_else(evidence: RegistrationEvidence) -> str | None:
     height = height_of_else(evidence.surveys.rest)
-    if evidence.mask.is_ground or height >= LEAST_OF_REST:
+    if evidence.mask.leaves_little or height >= LEAST_OF_REST:
         return None
     return (
         "without the content that both images share pixel by pixel, chips all over hardly match: "
@@ -219,8 +219,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "second place nearby",
         f"the mean surface of chips all over has, within {SURVEY_RADIUS_PX} px, a second peak of "
-        f"{PEAK_DEVIATIONS:g} robust standard deviations; or, without a mask of the ground, a "
-        f"place elsewhere that is at least {RIVAL_HEIGHT:g} times as high",
+        f"{PEAK_DEVIATIONS:g} robust standard deviations; or, {UNMASKED}, "
+        f"a place elsewhere that is at least {RIVAL_HEIGHT:g} times as high",
         "suites real and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_nearby,
@@ -231,8 +231,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"the orientation of edges of the whole overlap matches, more than {SURVEY_RADIUS_PX} px "
         "and up to a quarter of its longer side off, at least "
         f"{RIVAL_HEIGHT:g} times as well, and by {LEAST_HEIGHT:g} robust standard deviations, as "
-        "poses above chance do. Not asked of rendered images and where a mask leaves the ground "
-        "alone; poses are compared with others by *second pose*",
+        f"poses above chance do. Asked {UNMASKED}, and not of rendered images; poses are compared "
+        "with others by *second pose*",
         "suites real, rotated_pairs and attacks",
         "give a larger part of the scene, which shows more than what repeats or is drawn over it",
         _second_place_far_off,
@@ -241,8 +241,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "weak similarity",
         f"less than {_LEAST_CHIPS:.0%} of chips all over overlap with the input where the "
-        "transform has them; or, without a mask of the ground, their mean similarity there is "
-        f"below {WEAK_HEIGHT:g} robust standard deviations of one surface",
+        f"transform has them; or, {UNMASKED}, their mean similarity there is below "
+        f"{WEAK_HEIGHT:g} robust standard deviations of one surface",
         "suites real and attacks",
         "give images with less noise, a mask that leaves more, or a larger pixel size for matching",
         _weak,
@@ -291,8 +291,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "nothing else in common",
         "the mean similarity of chips all over is below "
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
-        "vary alike and without the surroundings of edges that coincide. Not asked of two radar "
-        "images, of copies and views of one camera, and where a mask leaves the ground alone",
+        f"vary alike and without the surroundings of edges that coincide. Asked {UNMASKED}, and "
+        "not of two radar images, or of copies and views of one camera",
         "suites real and attacks",
         WITHOUT,
         _nothing_else,
