@@ -11,6 +11,7 @@ from ..errors import RasterContentError
 from ..progress import SILENT, Progress
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, Window
+from ..rasters.windows import cut
 from ..speckle.filters import SpeckleFilter
 from ..speckle.statistics import estimate_looks
 from .radar import power
@@ -43,12 +44,10 @@ class BlockMask:
 
     def cut(self, window: Window) -> Mask:
         """Return the pixels of a window that take part, valid or not; none beyond the scene."""
-        rows = np.arange(window.row, window.row + window.height) // self.factor
-        cols = np.arange(window.col, window.col + window.width) // self.factor
-        height, width = self.blocks.shape
-        inside = (rows >= 0) & (rows < height), (cols >= 0) & (cols < width)
-        chosen = self.blocks[np.ix_(rows.clip(0, height - 1), cols.clip(0, width - 1))]
-        return np.asarray(chosen & inside[0][:, None] & inside[1])
+        around = window.aligned(self.factor)
+        blocks = cut(self.blocks, Window(*(n // self.factor for n in around)))
+        pixels = blocks.repeat(self.factor, axis=0).repeat(self.factor, axis=1)
+        return pixels[window.slices_in(around)]
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""

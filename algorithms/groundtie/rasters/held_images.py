@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from affine import Affine
-from numpy.typing import NDArray
 
 from ..arrays import Raster
 from ..context import Context
@@ -21,7 +19,7 @@ from .patch import Patch
 from .reading import FloatImage, Mask, RasterSource
 from .tiling import tiles
 from .warping import reduction
-from .windows import Window
+from .windows import Window, cut
 
 # If a level shows less than this share of an image, its parts are read as needed instead.
 _SHOWN_SHARE = 0.5
@@ -93,8 +91,8 @@ class HeldImage:
         if off_px > POSITION_ERROR_PX:
             raise ValueError(f"a piece lies {off_px:.1f} px off the pixels that are held")
         part = Window.between(first, end)
-        values, valid = _cut(self.values, part), _cut(self.valid, part)
-        shown = None if self.shown is None else _cut(self.shown, part)
+        values, valid = cut(self.values, part), cut(self.valid, part)
+        shown = None if self.shown is None else cut(self.shown, part)
         return self.image.patch(values, valid, shown, hidden)
 
 
@@ -147,15 +145,3 @@ def _held(source: RasterSource, grid: Grid, values: FloatImage, valid: Mask) -> 
     # A raster without any declaration of validity must not seem to have one.
     nodata = float("nan") if source.says_what_is_valid else None
     return read_by(source, ArrayHandles(Raster(values)), BandInfo.plain("float32", nodata), grid)
-
-
-def _cut(array: NDArray[Any], part: Window) -> NDArray[Any]:
-    """Return a window of an array, 0 beyond it."""
-    whole = Window(0, 0, *array.shape[::-1])
-    inside = part.common(whole)
-    if inside == part:
-        return array[part.slices]
-    padded = np.zeros((part.height, part.width), array.dtype)
-    if min(inside.width, inside.height) > 0:
-        padded[inside.slices_in(part)] = array[inside.slices]
-    return padded

@@ -15,6 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .windows import Window, cut
+
 Weights = Callable[[NDArray[Any]], list[NDArray[Any]]]
 
 _REMAP_IS_EXACT = int(cv2.__version__.split(".")[0]) >= 5
@@ -153,17 +155,9 @@ def _by_filter(
     col, row = (math.floor(position) - reach + 1 for position in first)
     across, down = (kernel(np.array([position % 1])) for position in first)
     high, wide = (n + 2 * reach - 1 for n in size)
-    needed = np.zeros((len(bands), high, wide), bands.dtype)
-    rows, cols = (
-        slice(max(start, 0), max(min(start + n, most), 0))
-        for start, n, most in zip((row, col), (high, wide), bands.shape[1:], strict=True)
-    )
-    inside = bands[:, rows, cols]
-    top, left = rows.start - row, cols.start - col
-    needed[:, top : top + inside.shape[1], left : left + inside.shape[2]] = inside
     found = [
         cv2.sepFilter2D(band, -1, np.concatenate(across), np.concatenate(down), anchor=(0, 0))
-        for band in needed
+        for band in cut(bands, Window(col, row, wide, high))
     ]
     filtered = np.stack(found)[:, : size[0], : size[1]]
     # As in `_by_kernel`, positions more than a pixel outside are 0, though the kernel reaches them.

@@ -56,6 +56,6 @@ def kept_on(
 
 def _inside(source: RasterSource, part: Window) -> Mask:
     """Return which pixels of a window lie on a raster."""
-    cols, rows = part.col + np.arange(part.width), part.row + np.arange(part.height)
-    on_rows = (rows >= 0) & (rows < source.grid.height)
-    return np.logical_and.outer(on_rows, (cols >= 0) & (cols < source.grid.width))
+    inside = np.zeros((part.height, part.width), bool)
+    inside[part.common(source.window).slices_in(part)] = True
+    return inside

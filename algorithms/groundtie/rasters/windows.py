@@ -39,11 +39,11 @@ class Window(NamedTuple):
         return slice(self.row, self.row + self.height), slice(self.col, self.col + self.width)
 
     def common(self, other: Window) -> Window:
-        """Return the intersection with another window; if empty, a side is not positive."""
+        """Return the intersection with another window; if empty, a side is 0."""
         left, top = max(self.col, other.col), max(self.row, other.row)
         right = min(self.col + self.width, other.col + other.width)
         bottom = min(self.row + self.height, other.row + other.height)
-        return Window(left, top, right - left, bottom - top)
+        return Window(left, top, max(right - left, 0), max(bottom - top, 0))
 
     def widened(self, margin: int) -> Window:
         """Return the window with a margin on each side."""
@@ -63,6 +63,16 @@ class Window(NamedTuple):
         return self._replace(col=self.col - whole.col, row=self.row - whole.row).slices
 
 
+def cut(array: NDArray[Any], window: Window) -> NDArray[Any]:
+    """Return a window of an array, shape (…, h, w), which is 0 beyond it."""
+    inside = window.common(Window(0, 0, *array.shape[:-3:-1]))
+    if inside == window:
+        return array[(..., *window.slices)]
+    padded = np.zeros((*array.shape[:-2], window.height, window.width), array.dtype)
+    padded[(..., *inside.slices_in(window))] = array[(..., *inside.slices)]
+    return padded
+
+
 def read_window(
     dataset: Any, source: RasterSource, window: Window, bands: Sequence[int]
 ) -> tuple[NDArray[Any], Mask]:
@@ -79,19 +89,15 @@ def read_window(
     bands
         Numbers of the bands, from 1.
     """
-    shape = (len(bands), window.height, window.width)
     inside = window.common(source.window)
-    if inside.width <= 0 or inside.height <= 0:
+    if not inside.width or not inside.height:
+        shape = (len(bands), window.height, window.width)
         return np.zeros(shape, source.dtype), np.zeros(shape, bool)
     place = rasterio.windows.Window(*inside)
     values = _read(dataset, source, place, bands)
     valid = _validity(dataset, source, place, bands, values)
-    if inside == window:
-        return values, valid
-    padded, padded_valid = np.zeros(shape, source.dtype), np.zeros(shape, bool)
-    rows, cols = inside.slices_in(window)
-    padded[:, rows, cols], padded_valid[:, rows, cols] = values, valid
-    return padded, padded_valid
+    around = window._replace(col=window.col - inside.col, row=window.row - inside.row)
+    return cut(values, around), cut(valid, around)
 
 
 def _read(dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]) -> NDArray[Any]:
