@@ -16,7 +16,7 @@ from groundtie.geometry.terrain import Terrain
 from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.geometry.transform import Transform, load_transform
 from groundtie.rasters.grid import Grid, compose
-from groundtie.rasters.whole import write_raster
+from groundtie.rasters.writing import write_raster
 
 UTM = CRS.from_epsg(32633)
 PX_M = 10.0

@@ -18,8 +18,7 @@ Heights
     `height_surfaces` (heights at any position, voids filled), `height_units` (heights in metres),
     `rendered` (terrain models rendered as images).
 Writing
-    `delivery` (registered rasters), `writing` (a GeoTIFF like another raster), `tiff_file`,
-    `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `whole` (a GeoTIFF of a
-    raster in memory), `vrt` (virtual rasters), `atomic` (atomic outputs), `hidden_files` (temporary
-    files and leftovers).
+    `delivery` (registered rasters), `writing` (a GeoTIFF like another raster, or of an array),
+    `tiff_file`, `tiff_directories`, `tiff_blocks` and `tiff_overviews` (its bytes), `vrt` (virtual
+    rasters), `atomic` (atomic outputs), `hidden_files` (temporary files and leftovers).
 """

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import rasterio.shutil
+from numpy.typing import NDArray
 from rasterio.enums import ColorInterp
 from rasterio.io import MemoryFile
 
+from ..arrays import Raster
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
 from ..runs import RUN_TAG, run_tags
@@ -22,7 +25,7 @@ from .grid import Grid
 from .handles import FileHandles
 from .hidden_files import final_name
 from .metadata import BandInfo, fits
-from .reading import RasterSource
+from .reading import RasterSource, open_raster
 from .tiff_blocks import PixelType
 from .tiff_directories import BLOCK, base_image
 from .tiff_file import TiledFile, require_space
@@ -114,6 +117,32 @@ def create_like(
     if beside is not None:
         with writing(path):
             Path(f"{os.fspath(path)}.aux.xml").write_bytes(beside)
+
+
+def write_raster(
+    path: Path,
+    image: NDArray[Any],
+    grid: Grid,
+    band_names: Sequence[str],
+    nodata: float | None = None,
+    rpc_tags: Mapping[str, str] | None = None,
+) -> None:
+    """Write bands, shape (bands, rows, columns), as GeoTIFF, with RPCs if there are any.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written completely.
+    """
+    like = open_raster(Raster(image))
+    kinds = (ColorInterp.gray, *repeat(ColorInterp.undefined, len(image) - 1))
+    bands = tuple(
+        replace(band, description=name, interpretation=kind)
+        for band, name, kind in zip(like.bands, band_names, kinds, strict=True)
+    )
+    named = replace(like, bands=bands)
+    with create_like(named, grid, path, nodata=nodata, rpc_tags=rpc_tags) as file:
+        file.write(image)
 
 
 def one_band(source: RasterSource, dtype: str) -> RasterSource:

@@ -12,7 +12,7 @@ import numpy as np
 from ..geometry.models import DEGREE, TERRAIN
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import FloatArray
-from ..rasters.whole import write_raster
+from ..rasters.writing import write_raster
 from .metadata import optical_item, sar_item
 from .pair import SAR, SimulatedPair, scene_grid
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..rasters.atomic import Outputs, make_folder, write_json, writing
 from ..rasters.grid import PIXEL_COORDINATES, Grid
-from ..rasters.whole import write_raster
+from ..rasters.writing import write_raster
 from ..sensor.rpc_files import write_rpc
 from ..sensor.rpc_tags import rpc_to_tags
 from .files import write_table

@@ -12,7 +12,7 @@ from ..context import Context
 from ..declaration import file_lines, given_files
 from ..rasters.atomic import Outputs, write_json, writing
 from ..rasters.grid import Grid
-from ..rasters.whole import write_raster
+from ..rasters.writing import write_raster
 from ..similarity.peak import Peak, find_peak
 from ..similarity.surface import Surface
 from .window_surface import SurfaceSettings, Window, second_peak
