@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from own_processes import ENVIRONMENT
 
-from groundtie.packages import PACKAGES, needed_for, use_one_thread
+from groundtie.packages import PACKAGES, interpreter, needed_for, use_one_thread
 from groundtie.tools import NAMES
 
 PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
@@ -76,3 +76,18 @@ def test_no_more_threads_than_processors_that_are_allotted() -> None:
     command = [sys.executable, "-c", script]
     run = subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, text=True)
     assert run.stdout.split() == ["1", "1"]
+
+
+@pytest.mark.parametrize("place", ["bin/python3", "python.exe"])
+def test_within_qgis_the_interpreter_is_beside_it(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = interpreter()
+    assert running is not None
+    assert running.name.startswith("python")
+    python = tmp_path / "apps" / "Python312" / place
+    python.parent.mkdir(parents=True)
+    python.touch()
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "qgis-bin.exe"))
+    monkeypatch.setattr(sys, "exec_prefix", str(tmp_path / "apps" / "Python312"))
+    assert interpreter() == python

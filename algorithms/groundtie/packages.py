@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,19 @@ def use_one_thread() -> None:
     """
     for name in _THREADS_OF:
         os.environ.setdefault(name, "1")
+
+
+def interpreter() -> Path | None:
+    """Return the Python interpreter; within QGIS, `sys.executable` may be QGIS itself or empty."""
+    own = Path(sys.executable or "-")
+    named = [own] if own.stem.lower().startswith("python") else []
+    beside = [
+        Path(prefix) / folder / name
+        for prefix in (sys.exec_prefix, sys.base_exec_prefix, own.parent)
+        for folder in ("", "bin")
+        for name in ("python3", "python", "python3.exe", "python.exe")
+    ]
+    return next((path for path in [*named, *beside] if path.is_file()), None)
 
 
 def processors() -> int:

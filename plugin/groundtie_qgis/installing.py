@@ -39,7 +39,7 @@ def pip_command(requirements: list[str], folder: Path) -> list[str]:
     compiled for their own numpy, which is found first.
     """
     return [
-        interpreter(),
+        str(packages.interpreter() or "python3"),
         *("-m", "pip", "install", "--only-binary=:all:", "--upgrade", "--target", str(folder)),
         *requirements,
         *numpy_bound(),
@@ -54,17 +54,6 @@ def numpy_bound() -> list[str]:
     except ImportError:
         return []
     return [f"numpy=={numpy.__version__}"]
-
-
-def interpreter() -> str:
-    """Return QGIS's Python; `sys.executable` may be QGIS itself where Python is embedded."""
-    names = ("python3", "python", "python3.exe", "python.exe")
-    folders = (Path(sys.exec_prefix), Path(sys.exec_prefix) / "bin", Path(sys.executable).parent)
-    running = Path(sys.executable or "qgis")
-    if running.stem.startswith("python") and running.is_file():
-        return str(running)
-    beside = [folder / name for folder in (*folders, running.parent / "bin") for name in names]
-    return next((str(path) for path in beside if path.is_file()), "python3")
 
 
 def as_typed(command: list[str]) -> str:

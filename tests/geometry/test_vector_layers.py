@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -122,22 +121,11 @@ def test_without_an_interpreter_it_is_read_here(
     layer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As in a program that embeds Python, and where the interpreter finds no fiona.
-    monkeypatch.setattr(vector_layers, "_python", lambda: None)
+    monkeypatch.setattr(vector_layers, "interpreter", lambda: None)
     assert len(read_vector_layer(layer).features) == 2
     monkeypatch.undo()
     started_as(monkeypatch, tmp_path, "import nothing_of_that_name\n")
     assert len(read_vector_layer(layer).features) == 2
-
-
-def test_within_qgis_the_interpreter_is_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    python = tmp_path / "bin" / "python3"
-    python.parent.mkdir()
-    python.touch()
-    monkeypatch.setattr(sys, "exec_prefix", str(tmp_path))
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "qgis-bin.exe"))
-    assert vector_layers._python() == python
 
 
 @pytest.mark.parametrize("content", [b"", b"SQLite format 3\0", b"{}", b"x" * 1000])

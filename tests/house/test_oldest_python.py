@@ -95,7 +95,7 @@ def test_vector_layers_are_read_by_it(
     """By a process of its own, whose options it must know; fiona is a stand-in."""
     stand_in = "def open(path):\n    raise ValueError(f'asked for {path}')\n"
     (tmp_path / "fiona.py").write_text(stand_in, encoding="utf-8")
-    monkeypatch.setattr(vector_layers, "_python", lambda: Path(oldest))
+    monkeypatch.setattr(vector_layers, "interpreter", lambda: Path(oldest))
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     assert vector_layers._read_apart("a.gpkg") == {"error": "asked for a.gpkg"}
 

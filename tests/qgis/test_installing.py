@@ -64,20 +64,6 @@ def test_pip_is_asked_for_what_is_missing_with_the_numpy_of_qgis(
     assert set(wanted) < set(command)
 
 
-def test_the_python_of_a_qgis_that_embeds_it_is_found(
-    plugin: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from groundtie_qgis.installing import interpreter
-
-    assert Path(interpreter()).name.startswith("python")
-    python = tmp_path / "apps" / "Python312" / "python.exe"
-    python.parent.mkdir(parents=True)
-    python.write_text("")
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "qgis-bin.exe"))
-    monkeypatch.setattr(sys, "exec_prefix", str(python.parent))
-    assert interpreter() == str(python)
-
-
 def test_a_command_can_be_typed(plugin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundtie_qgis.installing import as_typed
 
@@ -101,7 +87,7 @@ def run_dialog(
     from qgis.PyQt.QtCore import QEventLoop, QTimer
 
     monkeypatch.setitem(sys.modules, "sklearn", None)
-    monkeypatch.setattr(installing, "interpreter", lambda: str(python))
+    monkeypatch.setattr(installing.packages, "interpreter", lambda: python)
     done: list[str] = []
     dialog = install_dialog.InstallDialog(folder, lambda: done.append("finished"))
     assert "scikit-learn" in dialog.text.text()

@@ -23,6 +23,7 @@ from rasterio.errors import CRSError
 from rasterio.warp import transform_geom
 
 from ..errors import GeoreferencingError, VectorLayerError, raised_by
+from ..packages import interpreter
 from ..rasters.grid import Grid, full_turn, require_both_or_none, require_map
 from . import layer_reader
 
@@ -199,7 +200,7 @@ def write_vector_layer(
 
 def _read_apart(name: str) -> dict[str, Any] | None:
     """Return the result of `layer_reader` in a separate process; None if none can be started."""
-    python = _python()
+    python = interpreter()
     if python is None:
         return None
     # The process must find fiona where this one does: in QGIS, the plugin's folder is on the path.
@@ -222,15 +223,3 @@ def _read_apart(name: str) -> dict[str, Any] | None:
         return dict(json.loads(done.stdout))
     # Python's own failures have code 1: an interpreter without fiona does not count.
     return None if done.returncode == 1 else {"error": "it is damaged: GDAL crashes on it"}
-
-
-def _python() -> Path | None:
-    """Return the Python interpreter; within QGIS, `sys.executable` may be QGIS itself or empty."""
-    own = Path(sys.executable or "-")
-    beside = [
-        Path(folder) / name
-        for folder in (sys.exec_prefix, sys.base_exec_prefix)
-        for name in ("python.exe", "bin/python3")
-    ]
-    named = [own] if own.stem.lower().startswith("python") else []
-    return next((path for path in [*named, *beside] if path.is_file()), None)
