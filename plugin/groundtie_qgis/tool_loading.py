@@ -13,9 +13,13 @@ from .library import library_module, library_name
 
 def all_tools() -> tuple[Any, ...]:
     """Return the declarations of all tools."""
-    # developer warnings of dependencies do not belong in QGIS's log
-    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
+    _ignore_warnings()
     return tuple(library_module("tools").load_tools())
+
+
+def _ignore_warnings() -> None:
+    """Keep developer warnings of dependencies out of QGIS's log."""
+    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
 
 
 class LazyTool:
@@ -32,13 +36,18 @@ class LazyTool:
         self.title = title
         self.group = group
         self.summary = summary
+        self._declared: Any = None
 
     def loaded(self) -> bool:
         """Whether the declaration has been imported."""
-        return self.name in _TOOLS
+        return self._declared is not None
 
     def __getattr__(self, attribute: str) -> Any:
-        return getattr(_tool(self.name), attribute)
+        if self._declared is None:
+            _ignore_warnings()
+            with rasterio_env():
+                self._declared = library_module("tools").load_tool(self.name)
+        return getattr(self._declared, attribute)
 
 
 @cache
@@ -46,14 +55,3 @@ def named_tools() -> tuple[LazyTool, ...]:
     """Return all tools with the texts for a list, without importing them."""
     tools = library_module("tools")
     return tuple(LazyTool(**vars(tools.named_tool(name))) for name in tools.NAMES)
-
-
-_TOOLS: dict[str, Any] = {}
-
-
-def _tool(name: str) -> Any:
-    if name in _TOOLS:
-        return _TOOLS[name]
-    warnings.filterwarnings("ignore", module=rf"{re.escape(library_name())}\b")
-    with rasterio_env():
-        return _TOOLS.setdefault(name, library_module("tools").load_tool(name))
