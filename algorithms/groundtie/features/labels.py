@@ -14,11 +14,11 @@ from ..context import Context
 from ..errors import ParameterError, VectorLayerError
 from ..geometry.vector_layers import read_vector_layer
 from ..masks.layer import AREAS, drawn_onto
-from ..masks.scene import sampled_onto
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import Image
 from ..rasters.patch import window_sums
 from ..rasters.reading import RasterSource, Window
+from ..rasters.warping import sample
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
 from .tiles import MARGIN_PX, Detecting, inside, tiles
@@ -54,7 +54,9 @@ class RasterLabels:
 
     def label(self, piece: Grid) -> Labels:
         """Return the labels of a grid's pixels, shape (h, w)."""
-        values, known = sampled_onto(piece, self.source, "nearest", 1)
+        values, known = sample(
+            self.source, piece, piece.to_pixels_of(self.source.grid), "nearest", 1
+        )
         numbers = [float(text) for text in self.left_out]
         labels = np.where(np.isin(values, numbers), LEFT_OUT, KEPT)
         return np.where(known, labels, UNKNOWN).astype(np.int8)

@@ -14,10 +14,9 @@ from ..progress import SILENT, Progress
 from ..rasters.averaging import area_average
 from ..rasters.grid import Grid
 from ..rasters.patch import Patch
-from ..rasters.reading import FloatImage, Mask, RasterSource, Window
+from ..rasters.reading import Mask, RasterSource, Window
 from ..rasters.tiff_directories import BLOCK
 from ..rasters.tiling import require_workable, tile_count, tiles
-from ..rasters.warping import sample
 from ..rasters.writing import create_like, one_band
 
 
@@ -107,13 +106,6 @@ def block_means(patch: Patch, factor: int) -> Patch:
         for size in patch.values.shape
     ]
     return Patch(*area_average(patch.values, patch.valid, edges[0], edges[1]))
-
-
-def sampled_onto(
-    grid: Grid, raster: RasterSource, method: str, band: int | None = None
-) -> tuple[FloatImage, Mask]:
-    """Resample a raster of any grid and map to another grid: see `warping.sample`."""
-    return sample(raster, grid, grid.to_pixels_of(raster.grid), method, band)
 
 
 def write_mask(
