@@ -62,7 +62,9 @@ _WITHOUT_WORLD_FILES = (".csv", ".json", ".geojson", ".gpkg", ".html", ".txt", "
 
 # Statement in the table of a raster, but not of a vector layer, which has the same ending.
 _TABLE_OF_RASTER = re.compile(rb'^\s*type\s+"?raster\b', re.I | re.M)
-_SEARCHED_BYTES = 10_000
+
+# The kind of a text file is stated within this much of its beginning.
+SEARCHED_BYTES = 10_000
 
 
 def raster_name(value: str | os.PathLike[str], folder: Path | None = None) -> Path | str:
@@ -246,7 +248,7 @@ def own_world_files(path: Path) -> list[Path]:
 def _is_of_raster(table: Path, raster: Path) -> bool:
     try:
         with table.open("rb") as file:
-            text = file.read(_SEARCHED_BYTES)
+            text = file.read(SEARCHED_BYTES)
     except OSError:
         return False
     is_named = os.fsencode(raster.name).lower() in text.lower()

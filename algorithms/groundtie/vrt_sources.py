@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from .raster_names import is_gdal_name, local_files
+from .raster_names import SEARCHED_BYTES, is_gdal_name, local_files
 
 # Beginning of a virtual raster, whatever its file is called.
 _START = b"<VRTDataset"
-_SEARCHED_BYTES = 1024
 
 # Elements that name a source, in any case: of mosaics, bands, overviews and warped rasters.
 _SOURCES = ("sourcefilename", "sourcedataset")
@@ -49,7 +48,7 @@ def _is_virtual(path: Path) -> bool:
     if not path.is_file():
         return False
     with path.open("rb") as file:
-        return _START in file.read(_SEARCHED_BYTES)
+        return _START in file.read(SEARCHED_BYTES)
 
 
 def _places(source: ElementTree.Element, folder: Path) -> list[Path]:
