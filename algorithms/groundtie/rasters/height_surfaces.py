@@ -52,8 +52,8 @@ class RasterSurface:
         The region, reduced and with its voids filled; its values fill the voids of the raster.
     valid
         Which of the reduced pixels hold values of the raster.
-    known
-        Which of the reduced pixels are not in a void left unfilled.
+    amid
+        Which of the reduced pixels hold values, or lie in voids that do not reach the edge.
     margin_px
         Distance beyond the outermost pixels' centres at which their values still hold.
     fills_open
@@ -65,7 +65,7 @@ class RasterSurface:
     region: Window
     filled: FloatImage
     valid: Mask
-    known: Mask
+    amid: Mask
     margin_px: float = _HALF_PX
     fills_open: bool = True
 
@@ -87,9 +87,8 @@ class RasterSurface:
 
     def encloses(self, positions: FloatArray) -> Mask:
         """Return which positions, (n, 2), lie on values of the raster or in voids amid them."""
-        amid = self.valid | _are_enclosed(self.valid)
         col, row = np.rint(self.to_px(positions)).T
-        return np.asarray(amid[self._nearest(*self._reduced(col, row))])
+        return np.asarray(self.amid[self._nearest(*self._reduced(col, row))])
 
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface needed for pixel positions, (n, 2)."""
@@ -106,11 +105,10 @@ class RasterSurface:
     def _fill_at(self, cols: NDArray[np.int_], rows: NDArray[np.int_]) -> FloatImage:
         x, y = self._reduced(cols, rows)
         values = interpolate(self.filled, np.stack([x, y])[:, None], "bilinear")[0]
-        known = self.known[self._nearest(x, y)]
         if not self.fills_open:
             col, row, width, height = self.region
-            known &= (cols >= col) & (cols < col + width) & (rows >= row) & (rows < row + height)
-        values[~known] = np.nan
+            known = (cols >= col) & (cols < col + width) & (rows >= row) & (rows < row + height)
+            values[~(known & self.amid[self._nearest(x, y)])] = np.nan
         return values
 
     def _reduced(self, cols: NDArray[Any], rows: NDArray[Any]) -> tuple[FloatArray, FloatArray]:
@@ -226,9 +224,8 @@ def surface_around(
     values, valid = read_heights(source, window, None if reduce == 1 else shape)
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
-    known = np.ones_like(valid) if fill_open else valid | _are_enclosed(valid)
-    filled = fill_voids(values, valid)
-    return RasterSurface(source, to_px, window, filled, valid, known, fills_open=fill_open)
+    amid, filled = valid | _are_enclosed(valid), fill_voids(values, valid)
+    return RasterSurface(source, to_px, window, filled, valid, amid, fills_open=fill_open)
 
 
 def _are_enclosed(valid: Mask) -> Mask:
