@@ -68,28 +68,26 @@ class VectorLayer:
         crs = grid.crs
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
         located = [
-            {**feature, "geometry": geometry}
+            (feature, geometry)
             for feature in self.features
             for geometry in simple_geometries(feature["geometry"])
         ]
+        geometries = [geometry for _, geometry in located]
         if self.crs is not None and self.crs != crs:
             try:
-                moved = transform_geom(self.crs, crs, [item["geometry"] for item in located])
+                geometries = transform_geom(self.crs, crs, geometries)
             except Exception as error:
                 if not isinstance(error, ValueError) and not raised_by(error, "rasterio"):
                     raise
                 raise VectorLayerError(f"cannot reproject {self.path}: {error}") from error
-            located = [
-                {**item, "geometry": geometry}
-                for item, geometry in zip(located, moved, strict=True)
-            ]
         longitude, turn = grid.pixel_to_map([grid.centre_px])[0, 0], full_turn(crs)
         if turn is not None:
-            located = [
-                {**item, "geometry": _near_longitude(item["geometry"], longitude, turn)}
-                for item in located
-            ]
-        return replace(self, crs=crs, features=tuple(located))
+            geometries = [_near_longitude(geometry, longitude, turn) for geometry in geometries]
+        features = (
+            {**feature, "geometry": geometry}
+            for (feature, _), geometry in zip(located, geometries, strict=True)
+        )
+        return replace(self, crs=crs, features=tuple(features))
 
 
 def _near_longitude(geometry: Any, longitude: float, turn: float) -> Any:
