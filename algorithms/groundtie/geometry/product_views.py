@@ -8,7 +8,7 @@ ground.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -23,6 +23,20 @@ RADAR, CAMERA = "radar", "camera"
 # The sensor, and its angles by name.
 Stated = tuple[str, Mapping[str, float]]
 
+# Elements with the heading, the side of the look (None: right) and the incidence angle, by an
+# element that only the metadata of that radar contain: Sentinel-1, TerraSAR-X, ICEYE.
+_RADARS: Mapping[str, tuple[str, str | None, str]] = {
+    ".//platformHeading": (".//platformHeading", None, ".//incidenceAngleMidSwath"),
+    ".//productInfo/sceneInfo/headingAngle": (
+        ".//headingAngle",
+        ".//acquisitionInfo/lookDirection",
+        ".//sceneCenterCoord/incidenceAngle",
+    ),
+    ".//incidence_center": (".//heading", ".//look_side", ".//incidence_center"),
+}
+
+# Elements of Maxar's metadata.
+_MEANS = ("MEANSATAZ", "MEANSATEL", "MEANSUNAZ", "MEANSUNEL")
 _IMD = re.compile(r"\b(mean(?:Sat|Sun)(?:Az|El))\s*=\s*(-?\d[\d.eE+-]*)", re.IGNORECASE)
 
 # A larger file does not hold metadata.
@@ -75,30 +89,14 @@ def _of_json(found: Any) -> Stated | None:
 
 
 def _of_xml(root: ElementTree.Element) -> Stated | None:
-    for tag, reader in _XML.items():
-        if root.find(tag) is not None:
-            return reader(root)
+    for own, (heading, side, incidence) in _RADARS.items():
+        if root.find(own) is not None:
+            heading_deg = _number(root, heading)
+            look = "right" if side is None else _text(root, side)
+            return RADAR, _from_track(heading_deg, look, _number(root, incidence))
+    if root.find(".//IMD/IMAGE/MEANSATAZ") is not None:
+        return _of_means({tag: _number(root, f".//IMAGE/{tag}") for tag in _MEANS})
     return None
-
-
-def _sentinel_1(root: ElementTree.Element) -> Stated:
-    heading = _number(root, ".//platformHeading")
-    return RADAR, _from_track(heading, "right", _number(root, ".//incidenceAngleMidSwath"))
-
-
-def _terrasar_x(root: ElementTree.Element) -> Stated:
-    side = _text(root, ".//acquisitionInfo/lookDirection")
-    incidence = _number(root, ".//sceneCenterCoord/incidenceAngle")
-    return RADAR, _from_track(_number(root, ".//headingAngle"), side, incidence)
-
-
-def _iceye(root: ElementTree.Element) -> Stated:
-    incidence = _number(root, ".//incidence_center")
-    return RADAR, _from_track(_number(root, ".//heading"), _text(root, ".//look_side"), incidence)
-
-
-def _maxar(root: ElementTree.Element) -> Stated:
-    return _of_means({tag: _number(root, f".//IMAGE/{tag}") for tag in _MEANS})
 
 
 def _of_imd(text: str) -> Stated:
@@ -165,14 +163,3 @@ def _text(root: ElementTree.Element, path: str) -> str:
 
 def _number(root: ElementTree.Element, path: str) -> float:
     return float(_text(root, path))
-
-
-_MEANS = ("MEANSATAZ", "MEANSATEL", "MEANSUNAZ", "MEANSUNEL")
-
-# Readers by an element that only the metadata of that product contain.
-_XML: Mapping[str, Callable[[ElementTree.Element], Stated]] = {
-    ".//platformHeading": _sentinel_1,
-    ".//productInfo/sceneInfo/headingAngle": _terrasar_x,
-    ".//incidence_center": _iceye,
-    ".//IMD/IMAGE/MEANSATAZ": _maxar,
-}
