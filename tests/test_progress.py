@@ -29,6 +29,14 @@ def test_parts_of_parts_are_nested() -> None:
     assert seen == [0.5, 1.0, 0.5, 0.75]
 
 
+def test_items_are_reported_when_the_next_is_asked_for() -> None:
+    seen: list[float] = []
+    progress = Progress(lambda fraction, message: seen.append(fraction))
+    items = progress.over(iter("abcd"), 4)
+    assert (next(items), next(items), seen) == ("a", "b", [0.25])
+    assert (list(items), seen) == (["c", "d"], [0.25, 0.5, 0.75, 1.0])
+
+
 @given(st.tuples(FRACTION, FRACTION).map(sorted), FRACTION)
 def test_a_part_stays_within_its_bounds(bounds: list[float], fraction: float) -> None:
     seen: list[float] = []

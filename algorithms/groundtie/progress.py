@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 from .errors import CancelledError
 
 _LOG = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 
 def _ignore(fraction: float, message: str) -> None:
@@ -42,6 +45,12 @@ class Progress:
         if message:
             _LOG.info(message)
         self.report(self.start + fraction * (self.end - self.start), message)
+
+    def over(self, items: Iterable[T], count: int) -> Iterator[T]:
+        """Yield `count` items, and report each as done when the next one is asked for."""
+        for number, item in enumerate(items, start=1):
+            yield item
+            self.update(number / count)
 
     def check(self) -> None:
         """Raise `CancelledError` if the user cancelled the work."""

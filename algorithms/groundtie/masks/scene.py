@@ -90,10 +90,9 @@ class Scene:
         all_tiles = tiles(self.grid, side)
         some = [one for one in all_tiles if (one.row + one.col) // side % step == 0]
         parts = []
-        for i, tile in enumerate(some):
+        for tile in progress.over(some, len(some)):
             means = block_means(self.read(tile), factor)
             parts.append(means.values[means.valid])
-            progress.update((i + 1) / len(some))
         return np.concatenate(parts)
 
 
@@ -164,8 +163,6 @@ def write_tiles(
     dtype, nodata
         Data type and nodata value of the raster.
     """
-    count = tile_count(scene.grid)
     with create_like(one_band(scene.like, dtype), scene.grid, path, nodata=nodata) as file:
-        for number, tile in enumerate(tiles(scene.grid), start=1):
+        for tile in progress.over(tiles(scene.grid), tile_count(scene.grid)):
             file.write(values(tile), window=tile)
-            progress.update(number / count)

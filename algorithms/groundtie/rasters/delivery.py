@@ -83,13 +83,12 @@ class _Warp:
         # A generator: there may be any number of tiles.
         tasks = ((tile, group) for tile in tiles(self.target) for group in self.groups)
         found = in_order(pool, lambda task: (*task, *self.tile(task)), tasks, ahead)
-        for i, (place, bands, values, valid) in enumerate(found):
+        for place, bands, values, valid in progress.over(found, count):
             if bands[0] == 1:
                 first = valid[0]
             if only_masked and (valid != first).any():
                 raise different_masks(self.source)
             yield place, bands, values, first, bool(valid.any())
-            progress.update((i + 1) / count)
 
     def tile(self, task: tuple[Window, tuple[int, ...]]) -> tuple[NDArray[Any], Mask]:
         """Return some bands of a tile and which of their pixels are valid, (bands, h, w)."""
@@ -253,7 +252,7 @@ def write_with_geotransform(
     """
     if grid.size != source.grid.size:
         raise ValueError("a new geotransform does not change the size of a raster")
-    count = tile_count(grid)
+    pixels = progress.part(0, 1 - _OVERVIEWS)
     with create_like(
         source,
         grid,
@@ -263,10 +262,9 @@ def write_with_geotransform(
         rpc_tags=rpc_tags,
         progress=progress.part(1 - _OVERVIEWS, 1),
     ) as file:
-        for i, tile in enumerate(tiles(grid)):
+        for tile in pixels.over(tiles(grid), tile_count(grid)):
             values, mask = source.read_untouched(tile)
             file.write(values, window=tile, valid=mask)
-            progress.update((i + 1) / count * (1 - _OVERVIEWS))
     progress.update(1.0)
 
 

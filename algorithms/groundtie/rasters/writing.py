@@ -236,11 +236,9 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
         with contextlib.closing(before) as handles:
             reduced = Reduced(handles, file.levels[number], nearest)
             tasks = reduced.tasks(file.bands)
-            for i, found in enumerate(in_order(file.executor, reduced.read, tasks, file.ahead)):
-                values, valid = found
-                bands, window = tasks[i]
+            made = zip(tasks, in_order(file.executor, reduced.read, tasks, file.ahead), strict=True)
+            for (bands, window), (values, valid) in part.over(made, len(tasks)):
                 file.write(values, bands, window=window, valid=valid, level=number)
-                part.update((i + 1) / len(tasks))
 
 
 def shared_nodata(source: RasterSource) -> float | None:
