@@ -369,8 +369,6 @@ def coarser_m(reference: Grid, input: Grid) -> float:
 
 def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:
     """Return the pixels of a grid within the bounding box of an outline and a margin."""
-    if not len(finite(outline_px)):
-        return None
     first, last = _extent(outline_px)
     size = np.array(grid.size)
     low = np.clip(np.ceil(first - margin_px), 0, size).astype(int)
