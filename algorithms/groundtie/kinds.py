@@ -69,22 +69,7 @@ class InputKind(PathKind):
     """A file that is read; neither a pipe, which may never end, nor a device."""
 
     def check(self, name: str, value: Any) -> Any:
-        path = super().check(name, value)
-        mode = _mode(name, path)
-        if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
-            raise ParameterError(f"{name} is neither a file nor a folder: {path}")
-        return path
-
-    def check_named(self, name: str, value: Any) -> Any:
-        """Check what may lie elsewhere than on disk: a path, a URL or another of GDAL's names."""
-        found = _named(name, value)
-        return found if isinstance(found, str) else InputKind.check(self, name, found)
-
-    def check_raster(self, name: str, value: Any) -> Any:
-        """Check what may be a raster: `check_named`, an asset of a STAC item, one in memory."""
-        if not isinstance(value, (str, os.PathLike)):
-            return _in_memory(name, value)
-        return InputKind.check_named(self, name, raster_of_item(_named(name, value)))
+        return _readable(name, super().check(name, value))
 
 
 class WrittenKind(PathKind):
@@ -125,7 +110,7 @@ class RasterIn(InputKind):
     def check(self, name: str, value: Any) -> Any:
         if self.must_have_name:
             _named(name, value)
-        return self.check_raster(name, value)
+        return _raster(name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,15 +126,14 @@ class RastersIn(Kind):
             raise ParameterError(f"{name} must be paths, not {_shown(value)}")
         if not given:
             raise ParameterError(f"{name} is missing")
-        kind = InputKind(label=self.label, help=self.help)
-        return tuple(kind.check_named(name, one) for one in given)
+        return tuple(_readable(name, _named(name, one)) for one in given)
 
 
 class VectorIn(InputKind):
     """A vector layer that is read; GDAL's own names and URLs as for `RasterIn`."""
 
     def check(self, name: str, value: Any) -> Any:
-        return self.check_named(name, value)
+        return _readable(name, _named(name, value))
 
 
 class MaskIn(InputKind):
@@ -162,8 +146,8 @@ class MaskIn(InputKind):
     def check(self, name: str, value: Any) -> Any:
         is_text = isinstance(value, (str, os.PathLike))
         if is_text and "#" not in os.fspath(value):
-            return self.check_named(name, value)
-        return self.check_raster(name, value)
+            return _readable(name, _named(name, value))
+        return _raster(name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -338,6 +322,22 @@ def _named(name: str, value: Any) -> Path | str:
         raise ParameterError(f"{name} must be a path, not {_shown(value)}")
     require_possible(name, os.fspath(value))
     return raster_name(value)
+
+
+def _readable(name: str, found: Path | str) -> Path | str:
+    """Return a path if it may be read, or GDAL's own name; `ParameterError` for other paths."""
+    mode = None if isinstance(found, str) else _mode(name, found)
+    if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise ParameterError(f"{name} is neither a file nor a folder: {found}")
+    return found
+
+
+def _raster(name: str, value: Any) -> Any:
+    """Return what may be a raster: a path, GDAL's name, an asset of a STAC item, one in memory."""
+    if not isinstance(value, (str, os.PathLike)):
+        return _in_memory(name, value)
+    found = raster_of_item(_named(name, value))
+    return _readable(name, _named(name, found))
 
 
 def _shown(value: Any) -> str:
