@@ -118,9 +118,9 @@ def interpolate(image: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[A
         for band, values in zip(bands, found, strict=True):
             cv2.remap(band, px[0], px[1], cv2.INTER_LINEAR, dst=values)
     elif (first := _first_of_neighbours(px)) is not None and not np.iscomplexobj(image):
-        found = _by_filter(bands, first, px.shape[1:], _KERNELS[method], REACH[method])
+        found = _by_filter(bands, first, px.shape[1:], method)
     else:
-        found = _by_kernel(bands, px, _KERNELS[method], REACH[method])
+        found = _by_kernel(bands, px, method)
     return np.asarray(found.reshape(*image.shape[:-2], *px.shape[1:]))
 
 
@@ -142,16 +142,13 @@ def _first_of_neighbours(px: NDArray[Any]) -> tuple[float, float] | None:
 
 
 def _by_filter(
-    bands: NDArray[Any],
-    first: tuple[float, float],
-    size: tuple[int, ...],
-    kernel: Weights,
-    reach: int,
+    bands: NDArray[Any], first: tuple[float, float], size: tuple[int, ...], method: str
 ) -> NDArray[Any]:
     """Return `_by_kernel` for `size` positions spaced as adjacent pixels, from `first` on.
 
     All positions have the same weights, so that the kernel is a filter of the image.
     """
+    kernel, reach = _KERNELS[method], REACH[method]
     col, row = (math.floor(position) - reach + 1 for position in first)
     across, down = (kernel(np.array([position % 1])) for position in first)
     high, wide = (n + 2 * reach - 1 for n in size)
@@ -167,8 +164,9 @@ def _by_filter(
     return filtered
 
 
-def _by_kernel(bands: NDArray[Any], px: NDArray[Any], kernel: Weights, reach: int) -> NDArray[Any]:
+def _by_kernel(bands: NDArray[Any], px: NDArray[Any], method: str) -> NDArray[Any]:
     """Return the sums of weighted pixels, shape (bands, m, n); all bands have the same weights."""
+    kernel, reach = _KERNELS[method], REACH[method]
     count, height, width = bands.shape
     # Padded for positions up to a pixel outside, with all pixels of their kernels.
     padded = np.zeros((count, height + 2 * reach + 1, width + 2 * reach + 1), bands.dtype)

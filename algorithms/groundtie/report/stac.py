@@ -28,9 +28,6 @@ EXTENSIONS = (
 
 _TIFF = "image/tiff; application=geotiff"
 
-# A footprint of more degrees of longitude crosses the antimeridian, which divides it in two.
-_MOST_DEGREES = 180
-
 
 def stac_item(
     source: RasterSource,
@@ -66,7 +63,8 @@ def stac_item(
     seen = reproject(grid.pixel_to_map(grid.outline()), grid.crs, LON_LAT)
     places = near_longitude(seen, 0.0, LON_LAT)
     longitudes = [seen[:, 0], places[:, 0]]
-    if not np.isfinite(places).all() or np.ptp(longitudes, axis=1).max() > _MOST_DEGREES:
+    # A footprint of more than half a turn crosses the antimeridian, which divides it in two.
+    if not np.isfinite(places).all() or np.ptp(longitudes, axis=1).max() > 180:
         return {}
     # GeoJSON's outer rings run counterclockwise (RFC 7946, section 3.1.6).
     x, y = (places - places.mean(axis=0)).T
