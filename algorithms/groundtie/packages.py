@@ -121,7 +121,7 @@ def use_one_thread() -> None:
 
 def interpreter() -> Path | None:
     """Return the Python interpreter; within QGIS, `sys.executable` may be QGIS itself or empty."""
-    own = Path(sys.executable or "-")
+    own = Path(sys.executable or sys.exec_prefix)
     named = [own] if own.stem.lower().startswith("python") else []
     beside = [
         Path(prefix) / folder / name
