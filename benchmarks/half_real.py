@@ -161,9 +161,9 @@ def make_scene(
 
 def _pixel_size_m(rpc: RPC) -> float:
     """Return the side of an image pixel on the ground, at the centre of the RPCs."""
-    slopes = rpc.derivatives([rpc.offset[:2]], rpc.offset[2])[0, :, :2]
+    centre, right, below = rpc.localise(rpc.image_offset + np.eye(3, 2, -1), rpc.offset[2])
     metres = 111_195.0 * np.array([np.cos(np.deg2rad(rpc.offset[1])), 1.0])
-    return float(np.sqrt(1 / abs(np.linalg.det(slopes / metres))))
+    return float(np.sqrt(abs(np.linalg.det(np.array([right - centre, below - centre]) * metres))))
 
 
 def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> Path:

@@ -62,18 +62,6 @@ def test_blocks_change_nothing(count: int) -> None:
     np.testing.assert_allclose(back, lon_lat, rtol=0, atol=1e-9)
 
 
-def test_derivatives_are_the_slopes_of_positions() -> None:
-    lon_lat, height = ground_of(CAMERA, 200)
-    slopes = CAMERA.derivatives(lon_lat, height)
-    for axis, step in enumerate((1e-6, 1e-6, 1e-1)):
-        move = np.zeros(3)
-        move[axis] = step
-        ahead = CAMERA.project(lon_lat + move[:2], height + move[2])
-        behind = CAMERA.project(lon_lat - move[:2], height - move[2])
-        numeric = (ahead - behind) / (2 * step)
-        np.testing.assert_allclose(slopes[:, :, axis], numeric, rtol=1e-6, atol=1e-6)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_the_inverse_holds_for_any_view(seed: int) -> None:

@@ -25,8 +25,6 @@ _STEPS = 12
 # Ground positions beyond this multiple of the RPCs' scales lie outside of the image.
 VALID_RANGE = 1.5
 
-_HALF_TURN_DEG = 180.0
-
 # Nodes along longitude, latitude and height of the positions that the inverse's start is fitted to.
 _START_NODES = (9, 9, 5)
 
@@ -70,10 +68,9 @@ class RPC:
         return np.array(self.polynomials)[[0, 2, 1, 3]]
 
     @cached_property
-    def _derivatives(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Coefficients, (4, 10) each, of the derivatives by longitude, latitude and height."""
-        by_lon, by_lat, by_height = (derivative(self._coefficients, axis) for axis in range(3))
-        return by_lon, by_lat, by_height
+    def _derivatives(self) -> FloatArray:
+        """Coefficients, (8, 10), of the derivatives by longitude, then of those by latitude."""
+        return np.concatenate([derivative(self._coefficients, axis) for axis in (0, 1)])
 
     def project(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of ground positions.
@@ -98,25 +95,6 @@ class RPC:
 
         in_blocks(work, len(px))
         return px
-
-    def derivatives(self, lon_lat: ArrayLike, height_m: ArrayLike) -> FloatArray:
-        """Return the derivatives of image positions by ground positions, shape (n, 2, 3).
-
-        Rows are column and row, columns longitude and latitude (px per degree) and height (px per
-        metre). Parameters as `project`.
-        """
-        lon_lat, height = _at_heights(lon_lat, height_m)
-        slopes = np.empty((len(lon_lat), 2, 3))
-
-        def work(part: slice, terms: FloatArray) -> None:
-            fill_terms(self._normalised(lon_lat[part], height[part]), terms)
-            values = self._coefficients @ terms
-            for axis, coefficients in enumerate(self._derivatives):
-                slope = _quotient_slope(values, coefficients @ terms[: coefficients.shape[1]])
-                slopes[part, :, axis] = (slope / self.scale[axis]).T * self.image_scale
-
-        in_blocks(work, len(slopes))
-        return slopes
 
     def localise(self, px: ArrayLike, height_m: ArrayLike) -> FloatArray:
         """Return longitude and latitude, shape (n, 2), of image positions at given heights.
@@ -175,7 +153,7 @@ class RPC:
         for axis, values in enumerate((lon_lat[:, 0], lon_lat[:, 1], height)):
             np.subtract(values, self.offset[axis], out=lph[axis])
         # Longitudes jump at the antimeridian.
-        if (np.abs(lph[0]) > _HALF_TURN_DEG).any():
+        if (np.abs(lph[0]) > 180).any():
             lph[:2] = near_longitude(lph[:2].T, 0.0, LON_LAT).T
         lph *= 1 / np.array(self.scale)[:, None]
         return lph
@@ -183,7 +161,7 @@ class RPC:
     def _newton(self, lph: FloatArray, target: FloatArray, terms: FloatArray) -> None:
         """Move normalised positions, (3, n), in place until they project to targets, (2, n)."""
         size = np.abs(np.array(self.image_scale))[:, None]
-        slopes = np.concatenate(self._derivatives[:2])
+        slopes = self._derivatives
         for _ in range(_STEPS):
             fill_terms(lph, terms)
             values = self._coefficients @ terms
