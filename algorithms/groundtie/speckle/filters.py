@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
+from numpy.typing import NDArray
 
 from ..rasters.reading import FloatImage, Mask
-from .frost import enhanced_frost
 from .isef import decay_for_window, isef
 from .statistics import LocalStatistics, local_statistics
 
@@ -109,8 +110,57 @@ def _kuan(by: SpeckleFilter, tile: _Tile) -> FloatImage:
     return _linear(tile, _signal_share(tile.local, by.looks) / np.float32(1 + 1 / by.looks))
 
 
-def _frost(by: SpeckleFilter, tile: _Tile) -> FloatImage:
-    return enhanced_frost(tile.padded, tile.counted, tile.local, by.looks, by.damping)
+def _enhanced_frost(by: SpeckleFilter, tile: _Tile) -> FloatImage:
+    """Return the enhanced Frost filter's estimate [Lopes1990a].
+
+    C is the coefficient of variation, Cu² = 1 / looks and Cmax² = 1 + 2 / looks. Where C is at most
+    Cu, as of speckle alone, the result is the local mean. Where it is at least Cmax, more than
+    speckle on any texture, the result is the pixel itself. Between the two, it is the mean with
+    weights exp(-damping (C - Cu) / (Cmax - C) d) at the city-block distance d.
+
+    For each damping, the weighted sum is a polynomial in exp(-damping), whose coefficients are the
+    sums over all pixels at each distance. They need no more additions than a plain convolution with
+    equal dampings.
+    """
+    speckle, most = np.float32(np.sqrt(1 / by.looks)), np.float32(np.sqrt(1 + 2 / by.looks))
+    variation = np.sqrt(tile.local.variation2)
+    # As the variation nears Cmax, the weight of a neighbour becomes 0.
+    share = np.maximum(variation - speckle, 0) / np.maximum(most - variation, np.float32(1e-3))
+    step = np.exp(np.float32(-by.damping) * share)
+    step[variation >= most] = 0
+    total = _sum_by_distance(tile.padded, step, tile.reach_px)
+    if tile.counted.all():
+        weight = polyval(step, _pixels_at(tile.reach_px))
+    else:
+        weight = _sum_by_distance(tile.counted.astype(np.float32), step, tile.reach_px)
+        weight = np.maximum(weight, np.float32(1e-6))
+    return np.asarray(total / weight)
+
+
+def _sum_by_distance(padded: FloatImage, step: FloatImage, half: int) -> FloatImage:
+    """Return the sum over the window of pixels times step^distance, shape of `step`."""
+    height, width = step.shape
+    # Sums of the pixels k to the left and k to the right.
+    pairs = [padded[:, half : half + width]]
+    pairs += [
+        padded[:, half - k : half - k + width] + padded[:, half + k : half + k + width]
+        for k in range(1, half + 1)
+    ]
+    total = np.zeros_like(step)
+    for distance in range(2 * half, -1, -1):
+        total *= step
+        for down in range(max(0, distance - half), min(distance, half) + 1):
+            lines = pairs[distance - down]
+            total += lines[half + down : half + down + height]
+            if down:
+                total += lines[half - down : half - down + height]
+    return total
+
+
+def _pixels_at(half: int) -> NDArray[np.float32]:
+    """Return the number of pixels of a window at each city-block distance from its centre."""
+    offset = np.abs(np.arange(-half, half + 1))
+    return np.bincount(np.add.outer(offset, offset).ravel()).astype(np.float32)
 
 
 def _gamma_map(by: SpeckleFilter, tile: _Tile) -> FloatImage:
@@ -146,7 +196,7 @@ def _linear(tile: _Tile, weight: FloatImage) -> FloatImage:
 
 
 FILTERS: dict[str, Callable[[SpeckleFilter, _Tile], FloatImage]] = {
-    "enhanced-frost": _frost,
+    "enhanced-frost": _enhanced_frost,
     "lee": _lee,
     "kuan": _kuan,
     "gamma-map": _gamma_map,
