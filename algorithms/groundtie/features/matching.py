@@ -85,15 +85,11 @@ def match_near(
 
 
 def _pairs_within(first: FloatArray, second: FloatArray, reach: float) -> Indices:
-    """Return all pairs of positions within reach, row numbers of shape (p, 2)."""
+    """Return all pairs of positions within reach, row numbers of shape (p, 2), ascending."""
     from scipy.spatial import cKDTree  # takes 0.1 s to import; all tools import this module
 
-    if len(first) == 0 or len(second) == 0:
-        return np.zeros((0, 2), np.intp)
-    near = cKDTree(second).query_ball_point(first, reach, return_sorted=True)
-    counts = np.array([len(partners) for partners in near])
-    partners = np.concatenate([np.asarray(p, np.intp) for p in near])
-    return np.column_stack([np.repeat(np.arange(len(first)), counts), partners])
+    near = cKDTree(first).sparse_distance_matrix(cKDTree(second), reach, output_type="ndarray")
+    return np.column_stack([near["i"], near["j"]])[np.lexsort((near["j"], near["i"]))]
 
 
 def _pair_distances(first: Descriptors, second: Descriptors, pairs: Indices) -> FloatArray:
