@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,22 +119,16 @@ def left_out_accuracy(
     class lie too near each other for that.
     """
     folds = blocks_of(labelled.px, _BLOCKS).sum(axis=1) % _FOLDS
-    decided: list[NDArray[np.bool_]] = []
-    truth: list[NDArray[np.bool_]] = []
+    decided = np.full(len(labelled), np.nan)
     for fold in range(_FOLDS):
-        rest, out = labelled.take(folds != fold), labelled.take(folds == fold)
-        try:
+        out = folds == fold
+        with suppress(TooFewPointsError):
+            rest = labelled.take(~out)
             found = train_classifier(rest, statistics, kernel, 1.0, seed, balanced)
-        except TooFewPointsError:
-            continue
-        decided.append(found.decide(out.statistics) > 0)
-        truth.append(out.kept)
-    if not decided:
-        return float("nan")
-    right, kept = np.concatenate(decided) == np.concatenate(truth), np.concatenate(truth)
-    if kept.all() or not kept.any():
-        return float("nan")
-    return float((right[kept].mean() + right[~kept].mean()) / 2)
+            decided[out] = found.decide(labelled.statistics[out])
+    right, known = (decided > 0) == labelled.kept, np.isfinite(decided)
+    classes = [right[known & own] for own in (labelled.kept, ~labelled.kept)]
+    return float(np.mean([own.mean() if len(own) else np.nan for own in classes]))
 
 
 def _require_both(labelled: Training) -> None:
