@@ -102,7 +102,8 @@ class Batch:
         opened = (
             open_executor(workers, self.scheduler) if executor is None else nullcontext(executor)
         )
-        with opened as pool, open_log(self.log, resume) as log:
+        with opened as pool:
+            log = open_log(self.log, resume)
             log.write("batch", tool=tool.name, version=__version__, rows=len(calls))
             self._run(calls, ended, pool, log, progress)
             result = BatchResult(

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import os
-from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from ..rasters.atomic import writing
+from ..rasters.atomic import append_json, writing
 from ..strict_json import read_json_lines
 from .calls import Call
 from .work import DONE, REFUSED, Outcome, files_of
@@ -18,12 +16,11 @@ from .work import DONE, REFUSED, Outcome, files_of
 ROW = "row"
 
 
+@dataclass(frozen=True)
 class EventLog:
     """Writes events to a file, each at once, so that a killed batch has logged all until then."""
 
-    def __init__(self, path: Path, file: IO[str]) -> None:
-        self._path = path
-        self._file = file
+    path: Path
 
     def write(self, event: str, **facts: Any) -> None:
         """Write an event with the current time (RFC 3339, UTC).
@@ -34,20 +31,15 @@ class EventLog:
             The disk is full, or the file cannot be written to.
         """
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
-        held = {"time": now.replace("+00:00", "Z"), "event": event, **facts}
-        line = json.dumps(held, allow_nan=False)
-        with writing(self._path):
-            self._file.write(line + "\n")
-            self._file.flush()
+        append_json(self.path, {"time": now.replace("+00:00", "Z"), "event": event, **facts})
 
     def row(self, call: Call, outcome: Outcome) -> None:
         """Write how a row ended."""
         self.write(ROW, row=call.row, name=call.name, key=call.key, **outcome.summary())
 
 
-@contextlib.contextmanager
-def open_log(path: Path, append: bool) -> Iterator[EventLog]:
-    """Open a log; without `append` an older one is replaced.
+def open_log(path: Path, append: bool) -> EventLog:
+    """Return a log; without `append` an older one is emptied.
 
     Raises
     ------
@@ -55,14 +47,8 @@ def open_log(path: Path, append: bool) -> Iterator[EventLog]:
         The file cannot be written to.
     """
     with writing(path):
-        file = path.open("a" if append else "w", encoding="utf-8")
-    try:
-        if append and _torn(path):
-            file.write("\n")
-        yield EventLog(path, file)
-    finally:
-        with writing(path):  # closing retries unwritten text
-            file.close()
+        path.open("a" if append else "w").close()
+    return EventLog(path)
 
 
 def read_finished(path: Path) -> dict[str, Outcome]:
@@ -91,11 +77,3 @@ def _outcome(event: dict[str, Any]) -> Outcome:
 def still_there(outcome: Outcome) -> bool:
     """Return whether the files of an earlier run are as it left them."""
     return files_of(tuple(map(Path, outcome.files))) == dict(outcome.files)
-
-
-def _torn(path: Path) -> bool:
-    with path.open("rb") as file:
-        if not file.seek(0, os.SEEK_END):
-            return False
-        file.seek(-1, os.SEEK_END)
-        return file.read() != b"\n"

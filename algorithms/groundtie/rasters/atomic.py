@@ -209,6 +209,24 @@ def write_json(path: Path, values: Mapping[str, Any], indent: int | None = 1) ->
         path.write_text(text, encoding="utf-8")
 
 
+def append_json(path: Path, values: Mapping[str, Any]) -> None:
+    """Append values as a line of strict JSON, at once: a run that is killed later has kept it.
+
+    A line that was cut off before costs itself alone.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    line = json.dumps(values, allow_nan=False) + "\n"
+    with writing(path), path.open("ab+") as file:
+        if file.seek(0, os.SEEK_END) > 0:
+            file.seek(-1, os.SEEK_END)
+            line = line if file.read() == b"\n" else "\n" + line
+        file.write(line.encode())
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder and its parents if they do not exist; errors as `writing`.
 

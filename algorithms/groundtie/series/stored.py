@@ -7,7 +7,6 @@ a line for each registration in `series.unfinished.jsonl`.
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +16,8 @@ from rasterio.errors import CRSError
 
 from ..errors import GroundTieError, OutputError, ParameterError, RasterOpenError
 from ..geometry.transform import Transform
-from ..rasters.atomic import make_folder, writing
+from ..kinds import plain
+from ..rasters.atomic import append_json, make_folder, writing
 from ..rasters.hidden_files import remove
 from ..rasters.reading import open_raster
 from ..runs import RUN_TAG, digest, file_state
@@ -126,9 +126,7 @@ def keep_unfinished(
     make_folder(folder)
     is_first = not path.exists()
     try:
-        with writing(path), path.open("a", encoding="utf-8") as file:
-            # The newline first: a killed run may have cut off the line before.
-            file.write("\n" + json.dumps(values))
+        append_json(path, plain(values))
     except OutputError:
         if is_first:
             remove(path)
