@@ -12,6 +12,7 @@ from shapely.geometry import LineString, mapping
 
 from ..context import Context
 from ..errors import NoOverlapError, NotRegisteredError
+from ..geometry.transform import Transform
 from ..geometry.vector_layers import write_vector_layer
 from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writing
 from ..rasters.grid import Grid
@@ -58,7 +59,10 @@ class SeriesFiles:
             No date was registered.
         """
         if not series.registered:
-            self._write_refusal(series)
+            if self.report is not None:
+                make_folder(self.report.parent)
+            with Outputs() as outputs:
+                self._write_report(series, outputs)
             self._remove_stale(series, stored)
             self._remove_tables()
             forget_unfinished(self.folder)
@@ -85,27 +89,21 @@ class SeriesFiles:
         self, series: Series, stored: StoredSeries, outputs: Outputs, context: Context
     ) -> Series:
         """Write the rasters that do not exist yet, and return the series with all its rasters."""
-        dates, written, items = [], {}, []
+        dates = []
         for number, one in enumerate(series.dates):
             part = context.part(number / len(series.dates), (number + 1) / len(series.dates))
-            try:
-                made = self._with_raster(one, series, stored, outputs, part)
-            except NoOverlapError as error:
-                # The date lies outside of the series' map; the other dates are kept.
-                verdict = replace(one.verdict, reason=f"{one.verdict.reason}; no raster: {error}")
-                one, made = replace(one, verdict=verdict), None
-            if made is not None:
-                one, raster, grid = made
-                beyond = series.beyond_overlap(one, self.output_grid)
-                share = None if beyond is None else beyond.share
-                written[one.name] = replace(raster, outside_of_overlap=share)
-                items.append(self._item(one, series, raster.file, grid))
+            if one.is_registered:
+                try:
+                    one = self._with_raster(one, series, stored, outputs, part)
+                except NoOverlapError as error:
+                    # The date lies outside of the series' map; the other dates are kept.
+                    reason = f"{one.verdict.reason}; no raster: {error}"
+                    one = replace(one, verdict=replace(one.verdict, reason=reason))
             dates.append(one)
         files = {"output_folder": self.folder}
         if self.report is not None:
             files["report"] = self.report
-        found = tuple(item for item in items if item)
-        return replace(series, dates=tuple(dates), written=written, items=found, files=files)
+        return replace(series, dates=tuple(dates), files=files)
 
     def _with_raster(
         self,
@@ -114,27 +112,35 @@ class SeriesFiles:
         stored: StoredSeries,
         outputs: Outputs,
         context: Context,
-    ) -> tuple[SeriesDate, StoredDate, Grid] | None:
-        """Return a date, its raster, and the raster's grid; None: the date is not registered."""
-        if not one.is_registered:
-            return None
+    ) -> SeriesDate:
+        """Return a date with its raster, which is written unless an earlier run wrote it."""
         assert one.date is not None and one.transform is not None
         key, before = self.raster_key(one, series), stored.dates.get(one.name)
-        if before is not None and before.key == key and before.is_untouched(self.folder):
-            corners = one.transform.input_grid.outline(2)
-            moved = one.transform(before.transform.inverse(corners)) - corners
-            # The tolerance that untouched pixels have, too.
-            if np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX:
-                has_written(self.folder / before.file)
-                with open_raster(self.folder / before.file) as source:
-                    return replace(one, transform=before.transform), before, source.grid
-        context.update(0.0, f"writing {one.name}")
-        path = self.folder / registered_name(one.name)
-        output = RegisteredOutput(path, self.output_grid, self.resampling)
-        grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
-        state = state_of(outputs.staged(path))
-        made = StoredDate(path.name, key, run_tags().get(RUN), state, one.transform)
-        return one, made, grid
+        if before is not None and before.key == key and self._stands(before, one.transform):
+            has_written(self.folder / before.file)
+            written = before
+            with open_raster(self.folder / before.file) as source:
+                grid = source.grid
+        else:
+            context.update(0.0, f"writing {one.name}")
+            path = self.folder / registered_name(one.name)
+            output = RegisteredOutput(path, self.output_grid, self.resampling)
+            grid = output.write(one.date.source, series.map_grid, one.transform, outputs, context)
+            state = state_of(outputs.staged(path))
+            written = StoredDate(path.name, key, run_tags().get(RUN), state, one.transform)
+        one = replace(one, transform=written.transform)
+        share = series.share_beyond(one, self.output_grid)
+        written = replace(written, outside_of_overlap=share)
+        return replace(one, written=written, item=self._item(one, series, written.file, grid))
+
+    def _stands(self, before: StoredDate, transform: Transform) -> bool:
+        """Return whether a raster is as an earlier run left it, and where a transform puts it."""
+        if not before.is_untouched(self.folder):
+            return False
+        corners = transform.input_grid.outline(2)
+        moved = transform(before.transform.inverse(corners)) - corners
+        # The tolerance that untouched pixels have, too.
+        return bool(np.hypot(*moved.T).max() < UNTOUCHED_TOLERANCE_PX)
 
     def _item(self, one: SeriesDate, series: Series, file: str, grid: Grid) -> dict[str, Any]:
         """Return the STAC item of a registered date; empty if there can be none."""
@@ -149,12 +155,6 @@ class SeriesFiles:
         path, time = self.folder / file, one.listed.time
         return stac_item(one.date.source, path, grid, self.folder, quality, time)
 
-    def _write_refusal(self, series: Series) -> None:
-        if self.report is not None:
-            make_folder(self.report.parent)
-            with Outputs() as outputs:
-                self._write_report(series, outputs)
-
     def _write_report(self, series: Series, outputs: Outputs) -> None:
         if self.report is not None:
             from .report import SeriesReport  # matplotlib and jinja2 are heavy
@@ -163,7 +163,7 @@ class SeriesFiles:
 
     def _remove_stale(self, series: Series, stored: StoredSeries) -> None:
         """Remove rasters of dates that are left out now: they must not seem to be registered."""
-        current = {one.file for one in series.written.values()}
+        current = {one.written.file for one in series.dates if one.written is not None}
         for one in stored.dates.values():
             if one.file not in current and one.is_own(self.folder):
                 with writing(self.folder / one.file):

@@ -61,6 +61,10 @@ class SeriesDate:
         From the series' map to the date's pixels; None: the date is left out.
     is_reference
         Whether the date is the reference, which stays as it is.
+    written
+        The date's registered raster; None: there is none.
+    item
+        STAC item of that raster; empty: there is none.
     """
 
     listed: Listed
@@ -68,6 +72,8 @@ class SeriesDate:
     date: Date | None = None
     transform: Transform | None = None
     is_reference: bool = False
+    written: StoredDate | None = None
+    item: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -79,17 +85,9 @@ class SeriesDate:
         """Whether the date was registered: it is not left out, not the reference, and has links."""
         return self.verdict.accepted and not self.is_reference and self.verdict.evidence.links > 0
 
-    def row(self, frame: SeriesFrame, written: StoredDate | None) -> dict[str, Any]:
-        """Return the date's row of the table; shifts lead to nominal positions of its ground.
-
-        Parameters
-        ----------
-        frame
-            The series' frame.
-        written
-            The date's raster; None: there is none.
-        """
-        verdict, evidence = self.verdict, self.verdict.evidence
+    def row(self, frame: SeriesFrame) -> dict[str, Any]:
+        """Return the date's row of the table; shifts lead to nominal positions of its ground."""
+        verdict, evidence, written = self.verdict, self.verdict.evidence, self.written
         values: dict[str, Any] = dict.fromkeys(TABLE_COLUMNS)
         state = "registered" if verdict.accepted else "left out"
         values |= {
@@ -150,10 +148,6 @@ class Series:
         All parameters of the tool.
     seconds
         Duration.
-    written
-        The rasters that were written, by the names of the dates.
-    items
-        STAC items of these rasters.
     files
         The files that were written, by name.
     """
@@ -170,8 +164,6 @@ class Series:
     reused_pairs: int
     parameters: Mapping[str, Any]
     seconds: float = 0.0
-    written: Mapping[str, StoredDate] = field(default_factory=dict)
-    items: tuple[Mapping[str, Any], ...] = ()
     files: Mapping[str, Path] = field(default_factory=dict)
 
     @property
@@ -190,10 +182,10 @@ class Series:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table, one row a date (see `TABLE_COLUMNS`)."""
-        return [date.row(self.frame, self.written.get(date.name)) for date in self.dates]
+        return [date.row(self.frame) for date in self.dates]
 
-    def beyond_overlap(self, date: SeriesDate, grid: str) -> BeyondOverlap | None:
-        """Return the part of a registered date outside of all dates that it is linked with.
+    def share_beyond(self, date: SeriesDate, grid: str) -> float | None:
+        """Return the share of a registered date outside of all dates that it is linked with.
 
         None: there is no such part, as on the series' grid.
 
@@ -219,11 +211,13 @@ class Series:
             seen = [one.input_grid.contains(one(xy)) for one in others]
             return np.any(seen, axis=0)
 
-        return BeyondOverlap.of(grid, date.transform, is_checked)
+        beyond = BeyondOverlap.of(grid, date.transform, is_checked)
+        return None if beyond is None else beyond.share
 
     def beyond_line(self) -> str:
         """Return a line of text on the parts of dates that nothing has checked; empty: none."""
-        shares = {name: one.outside_of_overlap or 0.0 for name, one in self.written.items()}
+        written = {one.name: one.written for one in self.dates if one.written is not None}
+        shares = {name: one.outside_of_overlap or 0.0 for name, one in written.items()}
         name = max(shares, key=lambda name: shares[name], default="")
         if not shares.get(name):
             return ""
@@ -284,7 +278,7 @@ class Series:
         """
         values = self.summary()
         for row, date in zip(values["dates"], self.dates, strict=True):
-            transform, written = date.transform, self.written.get(date.name)
+            transform, written = date.transform, date.written
             row["transform"] = None if transform is None else transform.to_json()
             row["written"] = None if written is None else written.to_json()
             row["mask"] = None if date.listed.mask is None else date.listed.mask.summary()
@@ -293,7 +287,7 @@ class Series:
         return {
             "format": FORMAT,
             "type": "FeatureCollection",
-            "features": [plain(item) for item in self.items],
+            "features": [plain(date.item) for date in self.dates if date.item],
             "reference_key": self.reference_key,
             "frame": self.frame.to_json(),
             **values,
