@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from rasterio.crs import CRS
 from rasterio.features import shapes
-from shapely.geometry import Polygon, shape
+from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
 from ..context import Context
@@ -136,12 +136,8 @@ class Date:
         source, band = self.matched.source, self.matched.band
         small = overview_grid(source.grid, _FOOTPRINT_PX)
         _, valid = source.read(source.window, band, (small.height, small.width))
-        found = [
-            shape(geometry)
-            for geometry, value in shapes(valid.astype(np.uint8), transform=small.transform)
-            if value
-        ]
-        return [np.array(polygon.exterior.coords) for polygon in found]
+        found = shapes(valid.astype(np.uint8), valid, transform=small.transform)
+        return [np.array(geometry["coordinates"][0]) for geometry, _ in found]
 
     def footprint(self, crs: CRS | None) -> Any:
         """Return the outline of its valid pixels as a shapely polygon on a map."""
