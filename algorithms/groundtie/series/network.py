@@ -146,7 +146,7 @@ def adjust(
 
 @dataclass(frozen=True)
 class _Solution:
-    """Displacements (n, 6) and their covariance (6 n, 6 n); NaN for dates that are not reached."""
+    """Displacements (n, 6), NaN for dates that are not reached, and covariance (n, 6, n, 6)."""
 
     displacements: FloatArray
     covariance: FloatArray
@@ -166,10 +166,9 @@ class _Solution:
             # S-transformation to the datum of zero mean.
             less_mean: FloatArray = np.eye(count)
             less_mean[:, reached] -= 1 / reached.sum()
-            change = np.asarray(np.kron(less_mean, np.eye(PARAMETERS)), np.float64)
-            covariance = (change @ covariance @ change.T).astype(np.float64)
-        blocks = covariance.reshape(count, PARAMETERS, count, PARAMETERS)
-        own = np.array([blocks[i, :, i] for i in range(count)])
+            change = "ij,jakb,lk->ialb"
+            covariance = np.einsum(change, less_mean, covariance, less_mean, optimize=True)
+        own = np.array([covariance[i, :, i] for i in range(count)])
         own[~reached] = np.nan
         return displacements, own
 
@@ -215,7 +214,7 @@ class _Network:
         """
         displacements = np.full((self.count, PARAMETERS), np.nan)
         displacements[self.hub] = 0.0
-        covariance = np.zeros((self.count * PARAMETERS,) * 2)
+        covariance = np.zeros((self.count, PARAMETERS) * 2)
         free = self.free
         if not free:
             return _Solution(displacements, covariance, scatter_px)
@@ -231,8 +230,8 @@ class _Network:
             if np.abs(step).max() < _PRECISION_PX:
                 break
         inverse = factors.solve(np.eye(len(free) * PARAMETERS))
-        rows = np.concatenate([np.arange(PARAMETERS) + PARAMETERS * date for date in free])
-        covariance[np.ix_(rows, rows)] = inverse
+        every = range(PARAMETERS)
+        covariance[np.ix_(free, every, free, every)] = inverse.reshape((len(free), PARAMETERS) * 2)
         return _Solution(displacements, covariance, scatter_px)
 
     def statistics(self, solution: _Solution) -> FloatArray:
@@ -240,7 +239,7 @@ class _Network:
 
         It has a χ² distribution of `degrees_of_freedom`; NaN where no other link controls it.
         """
-        blocks = solution.covariance.reshape(self.count, PARAMETERS, self.count, PARAMETERS)
+        blocks = solution.covariance
         found = []
         for link in self.links:
             i, j = link.first, link.second
