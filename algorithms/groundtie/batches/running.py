@@ -8,10 +8,9 @@ from concurrent.futures import Executor, Future
 from queue import Empty, SimpleQueue
 
 from ..declaration import Tool
-from ..errors import GroundTieError
 from ..executors import POLL_SECONDS, result_of
 from .calls import Call
-from .work import DONE, FAILED, Outcome, Task, bug
+from .work import DONE, FAILED, Outcome, Task, ended_by
 
 
 def run_calls(
@@ -57,12 +56,10 @@ def run_calls(
 def _outcome(future: Future[Outcome]) -> Outcome:
     try:
         return result_of(future)
-    except GroundTieError as error:
-        return Outcome(FAILED, error.one_line())
     except ImportError as error:
         return Outcome(FAILED, f"a worker cannot import what it needs: {error}")
     except Exception as error:
-        return Outcome(FAILED, bug(error))
+        return ended_by(error)
 
 
 def progress_line(ran: Counter[str], ended: int, rows: int, seconds: float) -> str:

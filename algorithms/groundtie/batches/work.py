@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from contextvars import Context
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,28 +89,22 @@ class Task:
         """Run the call; any error becomes an outcome, too."""
         enter_worker()
         started = time.perf_counter()
-        result: Mapping[str, Any] = {}
         written: list[Path] = []
-        status, message, trace = FAILED, "", ""
         try:
             if self.version != __version__:
                 raise GroundTieError(f"the worker has GroundTie {__version__}, not {self.version}")
-            result = self._call(written)
-            status = DONE
+            outcome = Outcome(DONE, result=self._call(written))
         except CancelledError:
             raise
-        except NotRegisteredError as error:
-            status, message = REFUSED, error.one_line()
-            result = error.summary()
-        except GroundTieError as error:
-            message = error.one_line()
         except Exception as error:
-            message = bug(error)
-            trace = traceback.format_exc()
-        seconds = time.perf_counter() - started
-        files = files_of((*_among(self.outputs, written), *written))
-        # Numbers of one row that are not finite must not cost the table of all rows.
-        return Outcome(status, message, seconds, plain(dict(result)), files, trace)
+            outcome = ended_by(error)
+        return replace(
+            outcome,
+            seconds=time.perf_counter() - started,
+            # Numbers of one row that are not finite must not cost the table of all rows.
+            result=plain(dict(outcome.result)),
+            files=files_of((*_among(self.outputs, written), *written)),
+        )
 
     def _call(self, written: list[Path]) -> dict[str, Any]:
         """Run the tool, return its summary, and add the files that it writes to a list."""
@@ -134,9 +128,15 @@ def _among(outputs: Iterable[Path], written: Iterable[Path]) -> list[Path]:
     return [path for path in outputs if Path(os.path.abspath(path)) in places]
 
 
-def bug(error: Exception) -> str:
-    """Return the message for an unexpected exception."""
-    return " ".join(f"this is a bug in GroundTie: {type(error).__name__}: {error}".split())
+def ended_by(error: Exception) -> Outcome:
+    """Return the outcome of a call that ended by an error."""
+    if isinstance(error, NotRegisteredError):
+        return Outcome(REFUSED, error.one_line(), result=error.summary())
+    if isinstance(error, GroundTieError):
+        return Outcome(FAILED, error.one_line())
+    message = f"this is a bug in GroundTie: {type(error).__name__}: {error}"
+    trace = "".join(traceback.format_exception(error))
+    return Outcome(FAILED, " ".join(message.split()), traceback=trace)
 
 
 def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:
