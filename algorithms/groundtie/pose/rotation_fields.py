@@ -123,8 +123,7 @@ class Template:
         whose directions are random in every pixel.
         """
         spectra, energy = self._spectra_of(input, pose)
-        correlation = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
-        return correlation * self._weights(energy, input.density)
+        return self._correlation(spectra, pose.rotation_deg) * self._weights(energy, input.density)
 
     def surfaces_both_ways(self, input: Field, pose: Pose) -> tuple[Surface, Surface]:
         """Return the surfaces around a pose without shift, and around that pose plus 180°.
@@ -132,14 +131,13 @@ class Template:
         An image rotated by 180° has the conjugate spectrum.
         """
         spectra, energy = self._spectra_of(input, pose)
-        upright = self._correlation(spectra, pose.rotation_deg)[: self._span, : self._span]
         # Rotation by 180° makes the last pixel the first.
         top, left = (
             n - side - 2 * self.radius + 1
             for n, side in zip(self._shape, self.field.shape, strict=True)
         )
-        rotated = self._correlation(spectra.conj(), pose.rotation_deg)
-        rotated = rotated[top : top + self._span, left : left + self._span]
+        upright = self._correlation(spectra, pose.rotation_deg)
+        rotated = self._correlation(spectra.conj(), pose.rotation_deg, top, left)
         return (
             upright * self._weights(energy, input.density),
             rotated * self._weights(energy[::-1, ::-1], input.density),
@@ -184,14 +182,18 @@ class Template:
         at = np.arange(self._span)[:, None] / _COARSE - nodes
         return np.maximum(1 - np.abs(at), 0).astype(np.float32)
 
-    def _correlation(self, spectra: Spectrum, rotation_deg: float) -> FloatImage:
+    def _correlation(
+        self, spectra: Spectrum, rotation_deg: float, top: int = 0, left: int = 0
+    ) -> FloatImage:
+        """Return the correlation at all shifts, the first of which lies at `top` and `left`."""
         # Gradients rotate with the image, their squares by twice the angle.
         angle = 2 * np.radians(rotation_deg)
         cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
         real, imaginary = self._spectra
         product = (cosine * real + sine * imaginary) * spectra[..., 0]
         product += (cosine * imaginary - sine * real) * spectra[..., 1]
-        return np.asarray(scipy.fft.irfft2(product, self._shape))
+        correlation = scipy.fft.irfft2(product, self._shape)
+        return np.asarray(correlation[top : top + self._span, left : left + self._span])
 
     def _weights(self, coarse: FloatImage, density: float) -> FloatImage:
         """Return the reciprocal standard deviation of chance at each shift."""

@@ -98,8 +98,7 @@ class Level:
         """
         radius = surface.shape[0] // 2
         linear = pose.linear * self.pixel_px
-        if np.isfinite(radius_px):
-            surface[~_within(linear, pose.shift_px, radius, radius_px)] = 0
+        surface[~_within(linear, pose.shift_px, radius, radius_px)] = 0
         found = []
         for row, col in highest_peaks(surface, count, _SAME):
             across, down, height = _between(surface, row, col)
