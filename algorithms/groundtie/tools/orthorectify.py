@@ -12,7 +12,7 @@ from rasterio.errors import CRSError
 
 from ..context import threads
 from ..declaration import tool
-from ..errors import GeoreferencingError, ParameterError
+from ..errors import ParameterError
 from ..kinds import Crs, RasterOut
 from ..progress import SILENT, Progress
 from ..rasters.atomic import Outputs
@@ -20,6 +20,7 @@ from ..rasters.grid import require_map
 from ..rasters.reading import open_raster
 from ..registration.orthorectification import write_orthoimage
 from ..registration.sensor_input import Ground, open_sensor_image
+from ..sensor.heights import require_crs
 from .parameters import general, sensor
 from .results import SIZE_OUTPUTS, WrittenRaster
 
@@ -88,12 +89,10 @@ def orthorectify(
     ground = Ground(dem, dem_datum, geoid, height, dem_cover / 100)
     with threads(workers, progress) as context, ExitStack() as stack:
         source, model = open_sensor_image(image, rpc, stack)
-        grid = None
+        grid, map_crs = None, _crs(crs)
         if reference is not None:
-            grid = stack.enter_context(open_raster(reference)).grid
-            if grid.crs is None:
-                raise GeoreferencingError(f"{reference} has no CRS")
-        map_crs = _crs(crs) if grid is None else grid.crs
+            like = stack.enter_context(open_raster(reference))
+            grid, map_crs = like.grid, require_crs(like)
         oriented = ground.orient(source, model, map_crs, stack, progress)
         staged = stack.enter_context(Outputs()).stage(output)
         target = write_orthoimage(oriented, staged, context, grid, pixel_size, resampling)
