@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -57,12 +56,12 @@ def triplet_closures(
         partners.setdefault(link.first, set()).add(link.second)
         partners.setdefault(link.second, set()).add(link.first)
     largest = largest_statistic(links)
-    found = []
-    for a in sorted(partners):
-        later = sorted(date for date in partners[a] if date > a)
-        for b, c in combinations(later, 2):
-            if c in partners[b]:
-                found.append(_closure(frame, by_ends, (a, b, c), scatter_px, largest))
+    found = [
+        _closure(frame, by_ends, (a, b, c), scatter_px, largest)
+        for a, b in sorted(map(sorted, by_ends))
+        for c in sorted(partners[a] & partners[b])
+        if c > b
+    ]
     return tuple(sorted(found, key=lambda one: -one.statistic))
 
 
