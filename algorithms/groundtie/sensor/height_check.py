@@ -56,7 +56,7 @@ class HeightCheck:
         """Distance by which the ground leaves the RPCs' range: below (negative) or above it."""
         below = min(self.ground_m[0] - self.range_m[0], 0.0)
         above = max(self.ground_m[1] - self.range_m[1], 0.0)
-        return below if -below > above else above
+        return max(above, below, key=abs)
 
     def summary(self) -> dict[str, Any]:
         """Return the check as JSON values."""
