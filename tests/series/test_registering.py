@@ -29,7 +29,6 @@ WHOLE = (0, 0, 10, 10)
 @dataclass(frozen=True)
 class FakeDate:
     name: str
-    band: None = None
 
     @property
     def key(self) -> str:

@@ -96,7 +96,7 @@ def test_thumbnails_show_the_ground_on_a_map_of_another_crs(tmp_path: Path) -> N
     path = write_raster(tmp_path / "a.tif", wave_image(GRID, 600.0).astype(np.float32), GRID)
     found = series(list(DAYS))
     with open_raster(path) as source:
-        date = Date(found.dates[1].listed, source, Image(source), None)
+        date = Date(found.dates[1].listed, source, Image(source))
         one = replace(found.dates[1], date=date, transform=Transform.nominal(FRAME.grid.crs, GRID))
         dates = (found.dates[0], one, found.dates[2])
         report = SeriesReport.of(replace(found, dates=dates, map_grid=there))

@@ -78,6 +78,7 @@ class SeriesCall:
             given["max_error"],
             given["search_radius"],
             given["matching_pixel_size"],
+            band=given["band"],
         )
         return cls(listed, reference, settings, files, given)
 
@@ -102,7 +103,7 @@ class SeriesCall:
         with threads(given["workers"], progress) as context, ExitStack() as stack:
             if executor is None and given["scheduler"] is not None:
                 executor = stack.enter_context(open_executor(1, given["scheduler"]))
-            opened = open_dates(self.listed, given["band"], stack, context.part(0.0, 0.05))
+            opened = open_dates(self.listed, self.settings.band, stack, context.part(0.0, 0.05))
             dates, failures = _on_one_map(*opened, self.reference)
             try:
                 series = self._registered(

@@ -57,8 +57,6 @@ class Date:
         The raster as in its file.
     matched
         The image that is matched: the raster itself, or its grey image in memory.
-    band
-        The band of the file that is matched; None: the mean of all.
     drawn
         The image with its mask on its own pixels; None: it has no mask, or each pair makes it.
     """
@@ -66,7 +64,6 @@ class Date:
     listed: Listed
     source: RasterSource
     matched: Image
-    band: int | None
     drawn: Image | None = None
 
     @property
@@ -186,7 +183,7 @@ def open_dates(
             matched = Image(source, band)
             if held_bytes <= most_bytes:
                 matched = Image(held_grey(source, band))  # of the band that is matched alone
-            date = Date(one, source, matched, band, drawn)
+            date = Date(one, source, matched, drawn)
             date.read(with_footprints)
             dates.append(date)
         except CancelledError:

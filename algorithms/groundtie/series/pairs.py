@@ -56,6 +56,8 @@ class Settings:
         "auto", "translation", "similarity" or "affine".
     max_error_px, search_radius_m, matching_pixel_size_m, is_placed
         See `Specification`.
+    band
+        The band of the files that is matched, from 1; None: the mean of all.
     """
 
     model: str
@@ -63,6 +65,7 @@ class Settings:
     search_radius_m: float | None
     matching_pixel_size_m: float | None
     is_placed: bool = False
+    band: int | None = None
 
     def of_loops(self) -> Settings:
         """Return the settings of a pair that places no date, but closes a loop."""
@@ -159,7 +162,7 @@ def pair_key(first: Date, second: Date, settings: Settings, frame: SeriesFrame) 
     """Return the key of a registration, which need not be done again while the key is the same."""
     grid = frame.grid
     place = grid.transform, str(grid.crs), frame.centre_px, frame.half_px
-    return digest(first.key, second.key, first.band, settings, place, __version__)
+    return digest(first.key, second.key, settings, place, __version__)
 
 
 @dataclass(frozen=True)
@@ -193,21 +196,20 @@ class PairTask:
         dates = self.first, self.second
         listed = [date.listed.anywhere() for date in dates]
         key = pair_key(*dates, self.settings, self.frame)
-        bare = self.placed, self.settings, self.frame
-        return partial(_register_files, listed, self.first.band, key, bare)
+        return partial(_register_files, listed, key, self.placed, self.settings, self.frame)
 
 
 def _register_files(
-    listed: Sequence[Listed], band: int | None, key: str, bare: tuple[Any, Settings, SeriesFrame]
+    listed: Sequence[Listed], key: str, placed: Any, settings: Settings, frame: SeriesFrame
 ) -> PairResult:
     enter_worker()
     with threads(1) as context, ExitStack() as stack:
-        dates, failures = open_dates(listed, band, stack, context, with_footprints=False)
+        dates, failures = open_dates(listed, settings.band, stack, context, with_footprints=False)
         if failures:
             # The caller could open both files, so that the error may pass.
             return _failed(listed[0].name, listed[1].name, "; ".join(failures.values()))
         first, second = dates
-        found = register_pair(PairTask(first, second, *bare), context)
+        found = register_pair(PairTask(first, second, placed, settings, frame), context)
         return replace(found, key=key) if found.key else found
 
 
