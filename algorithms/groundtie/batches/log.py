@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ class EventLog:
 
     def row(self, call: Call, outcome: Outcome) -> None:
         """Write how a row ended."""
-        self.write(ROW, row=call.row, name=call.name, key=call.key, **outcome.summary())
+        self.write(ROW, row=call.row, name=call.name, key=call.key, **asdict(outcome))
 
 
 def open_log(path: Path, append: bool) -> EventLog:

@@ -34,7 +34,7 @@ class BatchRow:
             "row": self.call.row,
             "name": self.call.name,
             "status": self.outcome.status,
-            "exit_code": self.outcome.exit_code,
+            "exit_code": EXIT_CODES[self.outcome.status],
             "message": self.outcome.message,
             "seconds": self.outcome.seconds,
             "resumed": self.resumed,

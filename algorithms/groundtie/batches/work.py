@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from contextvars import Context
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +52,6 @@ class Outcome:
     result: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     traceback: str = ""
-
-    @property
-    def exit_code(self) -> int:
-        """Exit code that the command line of this call would have had."""
-        return EXIT_CODES[self.status]
-
-    def summary(self) -> dict[str, Any]:
-        """Return the outcome as JSON values."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
