@@ -56,6 +56,8 @@ class Matching:
         Receives each registration as soon as it is done.
     results, done, reused
         Registrations by the numbers of their dates; how many were done, and how many taken over.
+    hub
+        The date that others are registered to at present.
     described
         Descriptors of the hub's chips, which all of its registrations need.
     """
@@ -69,6 +71,7 @@ class Matching:
     executor: Executor | None
     keep: Callable[[PairResult], None]
     results: dict[tuple[int, int], PairResult] = field(default_factory=dict)
+    hub: int = 0
     described: Memo | None = None
     done: int = 0
     reused: int = 0
@@ -94,23 +97,23 @@ class Matching:
 
     def from_hub(self, hub: int) -> None:
         """Register all dates to a hub, the others to their neighbours, and close loops."""
-        self.described = Memo(share_bytes(DESCRIBED_SHARE))
+        self.hub, self.described = hub, Memo(share_bytes(DESCRIBED_SHARE))
         others = [date for date in range(len(self.dates)) if date != hub]
-        self._attempt_all([(hub, date) for date in others], hub)
-        self._reach(others, hub)
+        self._attempt_all([(hub, date) for date in others])
+        self._reach(others)
         reached = self.placed(hub)
         linked = [date for date in others if date in reached]
         if all(self._is_linked(hub, date) for date in linked):
-            self._attempt_all(self._partners(linked), hub)
+            self._attempt_all(self._partners(linked))
         else:
             # Two links of a date may be a path through it to other dates, instead of a loop.
-            self._attempt_all(self._neighbours(sorted(reached)), hub)
+            self._attempt_all(self._neighbours(sorted(reached)))
         for date in linked:
             for other in self._nearest(date, reached):
                 if self._degree(date) >= _WANTED_LINKS:
                     break
-                self._attempt(other, date, hub)
-        self._attempt_all(self._further(linked, hub), hub)
+                self._attempt(other, date)
+        self._attempt_all(self._further(linked))
 
     def freely(self) -> int:
         """Register as `from_hub` from several dates, and return the best hub."""
@@ -150,23 +153,23 @@ class Matching:
                         grew = True
         return found
 
-    def _reach(self, others: Sequence[int], hub: int) -> None:
+    def _reach(self, others: Sequence[int]) -> None:
         """Try to reach dates that the hub does not, from dates that are reached, nearest first."""
         grew = True
         while grew:
             grew = False
             for date in others:
-                placed = self.placed(hub)
+                placed = self.placed(self.hub)
                 if date in placed:
                     continue
                 for other in self._nearest(date, placed)[:_MOST_TRIES]:
-                    if self._attempt(other, date, hub):
+                    if self._attempt(other, date):
                         grew = True
                         break
 
-    def _attempt(self, first: int, second: int, hub: int) -> bool:
+    def _attempt(self, first: int, second: int) -> bool:
         """Register a pair unless it is done; return whether it is linked."""
-        self._attempt_all([(first, second)], hub)
+        self._attempt_all([(first, second)])
         return self._is_linked(first, second)
 
     def _is_linked(self, first: int, second: int) -> bool:
@@ -176,25 +179,25 @@ class Matching:
     def _known(self, first: int, second: int) -> PairResult | None:
         return self.results.get((first, second)) or self.results.get((second, first))
 
-    def _attempt_all(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
+    def _attempt_all(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Register pairs that are not done, from the present displacements of the dates.
 
         The results do not depend on each other: pairs may run in parallel.
         """
         worth = [ends for ends in pairs if self._share(*ends) >= _LEAST_SHARE]
         # A pair that is refused where the hub places its dates is done again, with a search.
-        while asked := {frozenset(ends): ends for ends in worth if not self._is_done(ends, hub)}:
-            self._register(tuple(asked.values()), hub)
+        while asked := {frozenset(ends): ends for ends in worth if not self._is_done(ends)}:
+            self._register(tuple(asked.values()))
 
-    def _register(self, pairs: Sequence[tuple[int, int]], hub: int) -> None:
+    def _register(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Register pairs, here or by the executor."""
-        placed = self.placed(hub)
+        placed = self.placed(self.hub)
         tasks = {
             (first, second): PairTask(
                 self.dates[first],
                 self.dates[second],
                 (placed.get(first), placed.get(second)),
-                self._settings((first, second), hub),
+                self._settings((first, second)),
                 self.frame,
             )
             for first, second in pairs
@@ -202,7 +205,7 @@ class Matching:
         if self.executor is None:
             for ends, task in tasks.items():
                 part = self._next_part(f"registering {task.second.name} to {task.first.name}")
-                memo = self.described if ends[0] == hub else None
+                memo = self.described if ends[0] == self.hub else None
                 self._add(ends, register_pair(task, replace(part, memo=memo)))
             return
         futures = {ends: self.executor.submit(task.elsewhere()) for ends, task in tasks.items()}
@@ -220,7 +223,7 @@ class Matching:
             for future in futures.values():
                 future.cancel()
 
-    def _settings(self, ends: tuple[int, int], hub: int) -> Settings:
+    def _settings(self, ends: tuple[int, int]) -> Settings:
         """Return the settings of a pair.
 
         If both dates were registered to the hub by all rules, the pair places neither of them: it
@@ -228,13 +231,13 @@ class Matching:
         """
         found = self._known(*ends)
         is_refused = found is not None and not found.accepted
-        links = [self._known(hub, date) for date in ends]
+        links = [self._known(self.hub, date) for date in ends]
         are_placed = all(one is not None and one.accepted and not one.is_placed for one in links)
         return self.settings.of_loops() if are_placed and not is_refused else self.settings
 
-    def _is_done(self, ends: tuple[int, int], hub: int) -> bool:
+    def _is_done(self, ends: tuple[int, int]) -> bool:
         found = self._known(*ends)
-        return found is not None and (not found.is_placed or self._settings(ends, hub).is_placed)
+        return found is not None and (not found.is_placed or self._settings(ends).is_placed)
 
     def _next_part(self, message: str) -> Context:
         expected = max(2 * len(self.dates) - 2, self.done + 1)
@@ -276,13 +279,13 @@ class Matching:
                 pairs.append((date, best[0]))
         return pairs
 
-    def _further(self, dates: Sequence[int], hub: int) -> list[tuple[int, int]]:
+    def _further(self, dates: Sequence[int]) -> list[tuple[int, int]]:
         """Return further pairs of doubtful dates.
 
         Their links are imprecise, or contradict others: further links show which are wrong.
         """
         links = self.links
-        found = adjust(self.frame, links, len(self.dates), hub, is_free=False)
+        found = adjust(self.frame, links, len(self.dates), self.hub, is_free=False)
         closures = triplet_closures(self.frame, links, found.scatter_px)
         doubtful = set(np.flatnonzero(found.imprecise).tolist())
         doubtful |= {date for one in closures if not one.is_closed for date in one.dates}
