@@ -99,9 +99,7 @@ def check_heights(
     """
     rpc = orientation.rpc
     seen = seen_at(rpc, size, orientation.heights.typical_m)
-    heights = orientation.heights.at(seen)
-    heights = heights[np.isfinite(heights)]
-    low, high = (float(np.quantile(heights, tail)) for tail in (_TAIL, 1 - _TAIL))
+    low, high = np.nanquantile(orientation.heights.at(seen), (_TAIL, 1 - _TAIL)).tolist()
     constant = isinstance(orientation.heights, ConstantHeight)
     geoid_m = None if constant else _geoid(seen)
     return HeightCheck((low, high), rpc.heights_m(), geoid_m, control_offset_m)

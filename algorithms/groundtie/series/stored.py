@@ -136,9 +136,8 @@ def keep_unfinished(
 def forget_unfinished(folder: Path) -> None:
     """Remove what `keep_unfinished` wrote."""
     path = folder / UNFINISHED
-    if path.exists():
-        with writing(path):
-            path.unlink()
+    with writing(path):
+        path.unlink(missing_ok=True)
 
 
 def read_series(folder: Path) -> StoredSeries:
