@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field, replace
-from itertools import permutations
+from itertools import compress, permutations
 
 import numpy as np
 
@@ -117,17 +117,14 @@ class Matching:
 
     def freely(self) -> int:
         """Register as `from_hub` from several dates, and return the best hub."""
-        shares = [
-            sum(self._share(i, j) for j in range(len(self.dates))) for i in range(len(self.dates))
-        ]
-        middle = (len(self.dates) - 1) / 2
-        order = sorted(
-            range(len(self.dates)), key=lambda i: (-round(shares[i], 1), abs(i - middle))
-        )
+        count = len(self.dates)
+        shares = [sum(self._share(i, j) for j in range(count)) for i in range(count)]
+        middle = (count - 1) / 2
+        order = sorted(range(count), key=lambda i: (-round(shares[i], 1), abs(i - middle)))
         tried: list[int] = []
         for hub in order:
             reached = set().union(*(self.placed(one) for one in tried))
-            if len(tried) == _MOST_TRIES or len(reached) > len(self.dates) / 2:
+            if len(tried) == _MOST_TRIES or len(reached) > count / 2:
                 break
             if hub not in reached or not tried:
                 self.from_hub(hub)
@@ -160,12 +157,9 @@ class Matching:
             grew = False
             for date in others:
                 placed = self.placed(self.hub)
-                if date in placed:
-                    continue
-                for other in self._nearest(date, placed)[:_MOST_TRIES]:
-                    if self._attempt(other, date):
-                        grew = True
-                        break
+                if date not in placed:
+                    nearest = self._nearest(date, placed)[:_MOST_TRIES]
+                    grew |= any(self._attempt(other, date) for other in nearest)
 
     def _attempt(self, first: int, second: int) -> bool:
         """Register a pair unless it is done; return whether it is linked."""
@@ -289,8 +283,8 @@ class Matching:
         closures = triplet_closures(self.frame, links, found.scatter_px)
         doubtful = set(np.flatnonzero(found.imprecise).tolist())
         doubtful |= {date for one in closures if not one.is_closed for date in one.dates}
-        for link, is_kept in zip(links, found.kept, strict=True):
-            doubtful |= set() if is_kept else {link.first, link.second}
+        for link in compress(links, ~found.kept):
+            doubtful |= {link.first, link.second}
         return [
             (other, date)
             for date in dates
