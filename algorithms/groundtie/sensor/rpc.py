@@ -19,7 +19,7 @@ from .polynomials import TERMS, derivative, fill_terms, in_blocks
 # The inverse has converged when it misses the image position by less, in pixels.
 _PRECISION_PX = 1e-7
 
-# Most steps until convergence; usually there is one (see `_Start`).
+# Most steps until convergence; usually there is one (see `RPC._start`).
 _STEPS = 12
 
 # Ground positions beyond this multiple of the RPCs' scales lie outside of the image.
@@ -110,13 +110,14 @@ class RPC:
         """
         px, height = _at_heights(px, height_m)
         found = np.empty((len(px), 2))
-        start = self._start
+        low, span, coefficients = self._start
 
         def work(part: slice, terms: FloatArray) -> None:
             target = ((px[part] - self.image_offset) / self.image_scale).T
             lph = np.empty_like(terms[:3])
             lph[2] = (height[part] - self.offset[2]) / self.scale[2]
-            lph[:2] = start(target, lph[2], terms)
+            fill_terms(np.vstack([_unit(target, low, span), lph[2]]), terms)
+            lph[:2] = coefficients @ terms
             with np.errstate(all="ignore"):
                 self._newton(lph, target, terms)
             found[part] = lph[:2].T * self.scale[:2] + self.offset[:2]
@@ -187,8 +188,25 @@ class RPC:
         return bool(np.isfinite(extent).all() and (extent > 0).all())
 
     @cached_property
-    def _start(self) -> _Start:
-        return _Start.of(self)
+    def _start(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Cubic polynomials from image position and height to longitude and latitude, normalised.
+
+        They are fitted over the whole range of the RPCs and right to a few pixels, so that Newton's
+        method needs one step.
+
+        Returns
+        -------
+        low, span, coefficients
+            Least image positions and their range, (2, 1) each, by which positions are brought to
+            within ±1, and the coefficients, (2, 20).
+        """
+        lph, terms = _ground_terms()
+        values = self._coefficients @ terms
+        image = values[:2] / values[2:]
+        low, span = image.min(axis=1, keepdims=True), np.ptp(image, axis=1, keepdims=True)
+        fill_terms(np.vstack([_unit(image, low, span), lph[2]]), terms)
+        coefficients = np.linalg.lstsq(terms.T, lph[:2].T, rcond=None)[0].T
+        return low, span, np.ascontiguousarray(coefficients)
 
 
 def image_places(
@@ -213,35 +231,6 @@ def image_places(
     axes = [np.linspace(-0.5, side - 0.5, nodes) for side in size]
     cols, rows, heights = (x.ravel() for x in np.meshgrid(*axes, np.asarray(heights_m, float)))
     return np.column_stack([cols, rows]), heights
-
-
-@dataclass(frozen=True)
-class _Start:
-    """Cubic polynomials from image position and height to longitude and latitude, normalised.
-
-    They are fitted over the whole range of the RPCs and right to a few pixels, so that Newton's
-    method needs one step.
-    """
-
-    low: FloatArray
-    span: FloatArray
-    coefficients: FloatArray
-
-    @classmethod
-    def of(cls, rpc: RPC) -> _Start:
-        """Fit the polynomials to positions all over the ground."""
-        lph, terms = _ground_terms()
-        values = rpc._coefficients @ terms
-        image = values[:2] / values[2:]
-        low, high = image.min(axis=1, keepdims=True), image.max(axis=1, keepdims=True)
-        fill_terms(np.vstack([_unit(image, low, high - low), lph[2]]), terms)
-        coefficients = np.linalg.lstsq(terms.T, lph[:2].T, rcond=None)[0].T
-        return cls(low, high - low, np.ascontiguousarray(coefficients))
-
-    def __call__(self, target: FloatArray, height: FloatArray, terms: FloatArray) -> FloatArray:
-        """Return normalised longitude and latitude, (2, n), near those of image positions."""
-        fill_terms(np.vstack([_unit(target, self.low, self.span), height]), terms)
-        return self.coefficients @ terms
 
 
 def _at_heights(positions: ArrayLike, height_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
