@@ -8,14 +8,17 @@ from dataclasses import replace
 import numpy as np
 from affine import Affine
 
-from groundtie.rasters.grid import compose
+from groundtie.rasters.grid import apply_affine, compose
 
 from . import cartography, effects
 from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction, resampled
 from .overlays import OVERLAYS, Draw
-from .pairs import Pair
+from .pairs import Pair, pixels
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
+
+# Rotations and scales of ground beneath locked content.
+_ROTATIONS_DEG, _SCALES = (6.0, 40.0), (1.12, 1.35)
 
 # How often blurred content has the opposite contrast in the input.
 _OPPOSITE = 0.3
@@ -94,6 +97,24 @@ def at_an_offset(draw: Draw) -> Make:
         right, down = (int(n) for n in other)
         note = f"overlay at ({right:+d}, {down:+d})"
         return moved.changed(drawn.change(), drawn.change(right, down), note)
+
+    return make
+
+
+def rotated(draw: Draw) -> Make:
+    """The ground is rotated or of another scale in the input; the locked content is not."""
+
+    def make(pair: Pair, setting: Setting) -> Pair:
+        rng = setting.rng
+        angle = float(rng.uniform(*_ROTATIONS_DEG) * rng.choice([-1, 1]))
+        scale = float(rng.uniform(*_SCALES) ** rng.choice([-1, 1]))
+        angle, scale = (angle, 1.0) if rng.random() < 0.6 else (0.0, scale)
+        about = compose(Affine.rotation(angle), Affine.scale(scale))
+        at, middle = pixels(pair.size), np.array(pair.size) / 2
+        shown = apply_affine(about, (at - middle).reshape(-1, 2)).reshape(at.shape) + middle
+        note = f"ground rotated by {angle:.0f}°, {scale:.2f} times as coarse"
+        made = pair.moved(at - shown + direction(rng, 0.0, 10.0), note)
+        return made.both(draw(made.reference.shape[1:], rng).change())
 
     return make
 
@@ -179,6 +200,7 @@ _WAYS = {
     "rightly placed": placed_right,
     "on the map": on_the_map,
     "resampled": on_another_grid(displaced),
+    "ground rotated": rotated,
     "other pixel size": of_wrong_scale,
     "at an offset": at_an_offset,
     "at an offset, resampled": on_another_grid(at_an_offset),

@@ -219,6 +219,20 @@ def test_controls_lie_where_they_say(pair: Pair) -> None:
     assert placed.errors_px(nominal)[0] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_ground_is_rotated_beneath_what_is_locked(seed: int, pair: Pair) -> None:
+    drawn = OVERLAYS["labels"](pair.reference.shape[1:], np.random.default_rng(2))
+    made = locked.rotated(lambda shape, rng: drawn)(pair, setting(seed))
+    covered = (drawn.alpha >= 1) & (made.input[0] > 0)
+    np.testing.assert_array_equal(made.reference[:, covered], made.input[:, covered])
+    # The truth is what the input shows, and no shift comes near to it.
+    bare = locked.rotated(lambda shape, rng: Overlay(np.zeros(shape), np.zeros(shape)))
+    assert agreement(bare(pair, setting(seed)))[1] <= 2.0
+    shown, at = made.known()
+    off = at - shown
+    assert made.errors_px(transform_of(made, *np.median(off, axis=0)))[0] > 6.0
+
+
 def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
     made = ground.self_copy(pair, setting())
     assert made.input.shape[0] == 3
