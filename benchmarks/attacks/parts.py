@@ -174,6 +174,19 @@ def bulge(pair: Pair, setting: Setting) -> Pair:
     return pair.moved(height[..., None] * off, f"hill by ({off[0]:+.1f}, {off[1]:+.1f}) px")
 
 
+def stretched(pair: Pair, setting: Setting) -> Pair:
+    """A part is stretched, as by a wrong control point: farther off the farther from a seam."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    rows, columns = np.indices(shape)
+    angle, still = rng.uniform(0, 2 * np.pi), rng.uniform(0.4, 0.7)
+    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    along = (along - along.min()) / np.ptp(along)
+    growing = np.clip((along - still) / (1 - still), 0, 1)
+    off = direction(rng, 10.0, 25.0)
+    note = f"{(growing > 0).mean():.0%} stretched by up to ({off[0]:+.1f}, {off[1]:+.1f}) px"
+    return pair.moved(direction(rng, 0.0, _WHOLE_PX) + growing[..., None] * off, note)
+
+
 def waves(pair: Pair, setting: Setting) -> Pair:
     """The whole input is warped smoothly, beyond any model of a few parameters."""
     rng, shape = setting.rng, pair.input.shape[1:]
@@ -194,5 +207,6 @@ ATTACKS = [
     Attack(PARTS, "jitter of rows", "", jitter),
     Attack(PARTS, "duplicated or missing rows", "", duplicated_rows),
     Attack(PARTS, "hill", "", bulge),
+    Attack(PARTS, "a part is stretched", "", stretched),
     Attack(PARTS, "smooth warp", "", waves),
 ]

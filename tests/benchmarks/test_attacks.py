@@ -233,6 +233,19 @@ def test_ground_is_rotated_beneath_what_is_locked(seed: int, pair: Pair) -> None
     assert made.errors_px(transform_of(made, *np.median(off, axis=0)))[0] > 6.0
 
 
+def test_a_stretched_part_lies_farther_off_the_farther_from_its_seam(pair: Pair) -> None:
+    made = parts.stretched(pair, setting(4))
+    known = np.isfinite(made.shown).all(axis=-1)
+    off = (pixels(made.size) - made.shown)[known]
+    still = np.median(off, axis=0)
+    away = np.hypot(*(off - still).T)
+    # Most lies still, the rest off by any length up to the largest.
+    assert 0.3 < np.mean(away < 0.01) < 0.95
+    assert 7.0 < away.max() <= 25.0
+    counts, _ = np.histogram(away[away > 0.01], bins=5)
+    assert counts.min() > 0
+
+
 def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
     made = ground.self_copy(pair, setting())
     assert made.input.shape[0] == 3
