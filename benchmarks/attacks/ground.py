@@ -20,6 +20,11 @@ from .pairs import Change, Image, Pair, Source, to_bytes
 from .scenes import SAR_SAR, Scene
 
 Shape = tuple[int, int]
+
+# Positions for drawing are in sixteenths of pixels, with so many bits of fractions.
+_FRACTION_BITS = 4
+_SIXTEENTHS = 2**_FRACTION_BITS
+
 Draw = Callable[[Shape, np.random.Generator], Change]
 
 
@@ -141,6 +146,42 @@ def water_moved(pair: Pair, setting: Setting) -> Pair:
     return moved.changed(drawn.change(), drawn.change(right, down), note)
 
 
+def shadows_moved(pair: Pair, setting: Setting) -> Pair:
+    """Scatter trees, whose shadows fall to another side in the input, over displaced dry ground."""
+    rng, shape = setting.rng, np.array(pair.reference.shape[1:])
+    shift, apart = direction(rng, 0.0, 12.0), rng.uniform(9.0, 20.0)
+    moved = pair.moved(shift, as_text(shift))
+    number = int(np.prod(shape) / apart**2)
+    trunks, radii = rng.uniform(0, 1, (number, 2)) * shape[::-1], rng.uniform(1.3, 3.0, number)
+    crown, shadow = rng.uniform(0.65, 0.9), rng.uniform(0.15, 0.35)
+    length, contrast = rng.uniform(2.0, 3.5), rng.uniform(0.25, 0.7)
+    azimuth = rng.uniform(0, 2 * np.pi)
+    turn = np.deg2rad(rng.uniform(60, 120)) * rng.choice([-1, 1])
+
+    def gains(sun: float) -> FloatArray:
+        to = trunks + (length * radii)[:, None] * np.array([np.cos(sun), np.sin(sun)])
+        gain = np.ones(shape, np.float32)
+        for first, last, radius in zip(_SIXTEENTHS * trunks, _SIXTEENTHS * to, radii, strict=True):
+            ends = (tuple(int(x) for x in np.rint(one)) for one in (first, last))
+            width = max(1, round(1.6 * radius))
+            cv2.line(gain, *ends, shadow, width, cv2.LINE_8, _FRACTION_BITS)
+        for at, radius in zip(_SIXTEENTHS * trunks, radii, strict=True):
+            centre, wide = tuple(int(x) for x in np.rint(at)), round(_SIXTEENTHS * radius)
+            cv2.circle(gain, centre, wide, crown, -1, cv2.LINE_8, _FRACTION_BITS)
+        return np.asarray(cv2.GaussianBlur(gain, (0, 0), 0.6))
+
+    def over(gain: FloatArray) -> Change:
+        return lambda image: to_bytes(
+            (60 + 0.6 * (image.mean() + contrast * (image - image.mean()))) * gain
+        )
+
+    at = np.nan_to_num(moved.shown, nan=-1.0).astype(np.float32)
+    later = cv2.remap(gains(azimuth + turn), at[..., 0], at[..., 1], cv2.INTER_LINEAR, None)
+    note = f"trees {apart:.0f} px apart, shadows of {length * radii.mean():.1f} px"
+    note += f" turned by {np.rad2deg(turn):.0f}°"
+    return moved.changed(over(gains(azimuth)), over(later), note)
+
+
 def two_dates(pair: Pair, setting: Setting) -> Pair:
     """Replace both images by the reference's ground as one camera sees it on two dates."""
     rng, grey = setting.rng, pair.reference.mean(axis=0, keepdims=True).astype(np.uint8)
@@ -239,6 +280,7 @@ ATTACKS = [
     ),
     Attack(GROUND, "water moved", "", water_moved),
     Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
+    Attack(GROUND, "shadows at another hour", "", shadows_moved, camera_only),
     Attack(GROUND, "reference in one band", "", self_copy),
     Attack(GROUND, "reference in one band", "resampled", resampled(self_copy)),
     Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),

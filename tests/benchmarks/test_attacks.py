@@ -246,6 +246,27 @@ def test_a_stretched_part_lies_farther_off_the_farther_from_its_seam(pair: Pair)
     assert counts.min() > 0
 
 
+def test_shadows_fall_to_another_side_of_trees_that_stand_still() -> None:
+    flat = np.full((1, SIDE, SIDE), 150, np.uint8)
+    seen = replace(SCENES[0].pair(1, Path()), source=Source(flat, flat, lambda px: px))
+    seen = replace(seen, reference=flat[:, : seen.size[1], : seen.size[0]])
+    made = ground.shadows_moved(seen, setting(2))
+    known = ndimage.binary_erosion(made.input[0] > 0, np.ones((9, 9)))
+    dark = [(150.0 - image[0]) for image in (made.reference, made.input)]
+    at = np.nan_to_num(made.shown, nan=-10).astype(np.float32)
+
+    def alike(right: int, down: int) -> float:
+        offset = np.array([right, down], np.float32)
+        moved = cv2.remap(dark[0], *np.moveaxis(at + offset, -1, 0), cv2.INTER_LINEAR)
+        return float(np.corrcoef(moved[known], dark[1][known])[0, 1])
+
+    # The shadows, which are all that is dark, match some pixels beside the trees.
+    places = range(-12, 13, 2)
+    best = max((alike(x, y), x, y) for x in places for y in places)
+    assert best[0] > alike(0, 0) + 0.1
+    assert 2.0 <= np.hypot(*best[1:]) <= 12.0
+
+
 def test_the_reference_in_a_band_is_the_reference(pair: Pair) -> None:
     made = ground.self_copy(pair, setting())
     assert made.input.shape[0] == 3
