@@ -98,6 +98,12 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
+def _share_of_ground(evidence: RegistrationEvidence) -> float:
+    ground = evidence.surveys.ground
+    is_peak = ground is not None and deviations_elsewhere(ground) >= REST_PEAK_DEVIATIONS
+    return ground.rival_height / max(ground.height, 0.1) if ground and is_peak else math.nan
+
+
 def _rest_peak(evidence: RegistrationEvidence) -> float:
     rest = _without_drawn(evidence)
     if rest is None or rest.survey is None or has_few_chips(rest.survey, rest.chips):
@@ -136,6 +142,7 @@ STATISTICS = (
         RIVAL_HEIGHT,
         _share_far_off,
     ),
+    Statistic("ground elsewhere: share of the height", RIVAL_HEIGHT, _share_of_ground),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),

@@ -91,6 +91,21 @@ def surveys_of(
         return survey_all(matcher, transform, places, accuracy_px, sensors, None, context)
 
 
+@pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
+def test_shadows_at_one_place_do_not_hide_that_the_ground_lies_elsewhere(
+    moved: tuple[int, int], tmp_path: Path, context: Context
+) -> None:
+    """Dark spots match where they coincide; what is not darkened, where the ground lies."""
+    at = np.random.default_rng(0).uniform(size=(SIDE, SIDE)) < 1 / 50
+    shadows = np.where(ndimage.binary_dilation(at, iterations=2), -6.0, 0.0)
+    images = (0.3 * noisy(place(to), seed) + shadows for to, seed in (((0, 0), 1), (moved, 2)))
+    surveys = surveys_of(tmp_path, *images, context)
+    assert surveys.whole is not None and surveys.ground is not None
+    for survey, expected in ((surveys.whole, (0, 0)), (surveys.ground, moved)):
+        top = np.unravel_index(np.argmax(survey.mean), survey.mean.shape)
+        assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(expected, abs=1)
+
+
 @pytest.mark.parametrize("share", [0.35, 0.6])
 @pytest.mark.parametrize("moved", [(11, -7), (4, -3)])
 @pytest.mark.parametrize("offset", [(0, 0), (6, -4), (6.4, -3.7)])

@@ -36,6 +36,7 @@ from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
+from groundtie.registration.scene import SceneInfo
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
 from groundtie.similarity.in_common import Sameness
@@ -59,6 +60,19 @@ def test_what_elevated_objects_displace_all_points_by_is_refused(
     """90 % of normal errors lie within 2.15 standard deviations; a limit of 3 px allows 4.55 px."""
     whole = MaskUsed(NONE, None, 1.0, "as in a town", elevated_px=elevated_px)
     assert refusing(evidence(GOOD, mask=whole, max_error_px=3.0)) == expected
+
+
+@pytest.mark.parametrize(
+    ("sensors", "where"),
+    [(Sensors.RADARS, "between forests"), (Sensors.CAMERAS, "outside of cast shadows")],
+)
+def test_a_refusal_names_the_ground_that_lies_elsewhere(
+    sensors: Sensors, where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SceneInfo, "sensors", sensors)
+    found = evidence(GOOD, survey=survey(), ground=survey(height=2.0, rival=1.7))
+    ((rule, reason),) = refusals(found)
+    assert rule.name == "ground elsewhere" and where in reason
 
 
 @pytest.mark.parametrize("folds", [0, 1, 5])

@@ -24,7 +24,7 @@ from .matcher import MaskOf, Places
 R = TypeVar("R")
 
 # Takes the reference and the input, and returns the part of the input that is compared.
-LeftOf = Callable[[Patch, Patch], Patch]
+PartOf = Callable[[Patch, Patch], tuple[Patch, Patch]]
 
 _Numbers = NDArray[np.intp]
 
@@ -56,11 +56,14 @@ class Resampled:
         Takes map positions, shape (n, 2), to pixels of the input.
     held
         Both images held in memory, resampled on the grid of the chips; None: they are read.
+    part_of
+        Takes both images on a piece of the grid and returns what of them is compared; None: all.
     """
 
     pair: ImagePair
     to_input: PointFunction
     held: tuple[HeldImage, HeldImage] | None = None
+    part_of: PartOf | None = None
 
     @classmethod
     def by_model(
@@ -98,13 +101,17 @@ class Resampled:
         return cls(pair, to_input, held)
 
     def read(self, piece: Grid, hidden: MaskOf | None = None) -> tuple[Patch, Patch]:
-        """Return both images on a piece of the grid, with hidden reference pixels masked."""
+        """Return what is compared on a piece of the grid, with hidden reference pixels masked."""
         masked = None if hidden is None else hidden(piece)
         if self.held is None:
-            reference = self.pair.reference_patch(piece, masked)
-            return reference, self.pair.input_patch(piece, self.to_input)
-        reference_held, input_held = self.held
-        return reference_held.read(piece, masked), input_held.read(piece)
+            both = (
+                self.pair.reference_patch(piece, masked),
+                self.pair.input_patch(piece, self.to_input),
+            )
+        else:
+            reference, input = self.held
+            both = reference.read(piece, masked), input.read(piece)
+        return both if self.part_of is None else self.part_of(*both)
 
 
 @dataclass(frozen=True)
@@ -121,15 +128,12 @@ class ChipWindows:
         Margin around a chip on each side, in pixels.
     hidden
         Takes a piece of a grid and returns which pixels of the reference are hidden; None: none.
-    left_of
-        Returns the part of the input that is compared; None: all of it is.
     """
 
     images: Resampled
     places: Places
     reach_px: int
     hidden: MaskOf | None
-    left_of: LeftOf | None = None
 
     def map(
         self,
@@ -212,9 +216,7 @@ class ChipWindows:
         corner = corners.min(axis=0)
         width, height = (int(n) for n in np.ptp(corners, axis=0) + side)
         piece = self.places.grid.window(int(corner[0]), int(corner[1]), width, height)
-        reference, input = self.images.read(piece, self.hidden)
-        left = input if self.left_of is None else self.left_of(reference, input)
-        return corner, (reference, left)
+        return corner, self.images.read(piece, self.hidden)
 
     def _cut(self, piece: _Piece, stack: _Numbers) -> tuple[Patch, Patch]:
         """Return the stacks of chips' reference and input windows in a piece."""

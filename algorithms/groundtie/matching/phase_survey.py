@@ -6,6 +6,8 @@ coincides. The ground beneath is weak, but has one shift everywhere, on which ph
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..context import Context
@@ -40,10 +42,14 @@ def survey_unexplained(images: Resampled, elsewhere_px: float, context: Context)
     places = Places.spread(
         images.pair.grid, _CHIP_PX, lambda side: np.clip(side // _CHIP_PX, 1, _MOST_ALONG)
     )
-    windows = ChipWindows(images, places, PHASES_REACH_PX, None, unexplained)
+    windows = ChipWindows(replace(images, part_of=_left), places, PHASES_REACH_PX, None)
     _, found = windows.map(_surfaces, context)
     surfaces = np.stack(found)
     return Survey(places.grid, places.centres, peak_shifts(surfaces), surfaces, elsewhere_px)
+
+
+def _left(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
+    return reference, unexplained(reference, input)
 
 
 def _surfaces(reference: Patch, left: Patch) -> Surface:

@@ -170,7 +170,8 @@ def survey_model(
         Takes a piece of the grid and returns which pixels of the reference are left out; None:
         none.
     """
-    least = None if without is None else LEAST_VALID_MASKED
+    is_whole = without is None and images.part_of is None
+    least = None if is_whole else LEAST_VALID_MASKED
     seen = replace(matcher, held_out=without, least_valid=least)
     kept, surfaces = seen.match_forward(images, places, SURVEY_RADIUS_PX, context)
     return Survey(places.grid, kept, peak_shifts(surfaces), surfaces, elsewhere_px)

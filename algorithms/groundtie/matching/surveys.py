@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 from ..context import Context
 from ..geometry.transform import Transform
+from ..rasters.patch import Patch
+from ..similarity.shadows import without_shadows
 from ..similarity.surface import SimilaritySettings
 from .chip_windows import Resampled
 from .chips import ChipMatcher
@@ -60,7 +62,8 @@ class Surveys:
         Without the content that is identical in both arrays; None: it is not looked for, because
         one image is rendered, or in the geometry of its sensor.
     ground
-        Of open ground; None: not both are radar images, or open ground alone takes part.
+        Of two radar images, of open ground; of two camera images, of what no cast shadow may
+        darken. None: the images are of both kinds or rendered, or open ground alone takes part.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
@@ -130,10 +133,18 @@ def survey_all(
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, both, part)
         if rest is not None:  # else there is no map layer that the ground could lie beneath
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
+    last = context.part(0.9, 1.0)
     if open_ground is not None:
-        last = context.part(0.9, 1.0)
         ground = survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)
+    elif sensors is Sensors.CAMERAS:
+        lit = replace(on_level, part_of=_outside_shadows)
+        once = replace(last, memo=None)
+        ground = survey_model(matcher, lit, places, elsewhere_px, once)
     return Surveys(whole, rest, ground, unexplained=unexplained)
+
+
+def _outside_shadows(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
+    return without_shadows(reference), without_shadows(input)
 
 
 def survey_rest(

@@ -51,7 +51,7 @@ def _unexplained(whole_reference: Patch, whole_input: Patch, rows: range) -> Pat
     )
     valid = reference.valid & input.valid
     known = 1 if valid.all() else np.maximum(_blurred(valid), np.finfo(np.float32).eps)
-    one, other = (_centred(patch.values, valid) for patch in (input, reference))
+    one, other = (centred(patch.values, valid) for patch in (input, reference))
 
     def mean(of: FloatImage) -> FloatImage:
         return np.asarray(_blurred(of) / known, np.float32)
@@ -73,8 +73,14 @@ def _blurred(stack: FloatImage | Mask) -> FloatImage:
     return each(lambda image: cv2.blur(image, size), stack.astype(np.float32, copy=False))
 
 
-def _centred(values: FloatImage, valid: Mask) -> FloatImage:
-    """Return values less a common middle: squares of large values lose small differences."""
+def centred(values: FloatImage, valid: Mask) -> FloatImage:
+    """Return values less a common middle, 0 if masked: squares of large ones lose small contrast.
+
+    Parameters
+    ----------
+    values, valid
+        Grey values and which of them count, shape (…, h, w).
+    """
     some = (..., slice(None, None, WINDOW_PX), slice(None, None, WINDOW_PX))
     sample = values[some][valid[some]]
     middle = np.median(sample) if sample.size else 0.0

@@ -198,12 +198,14 @@ def _nothing_else(evidence: RegistrationEvidence) -> str | None:
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    ground = evidence.surveys.ground
-    if ground is None or not _has_rival(ground):
+    survey = evidence.surveys.ground
+    if survey is None or not _has_rival(survey):
         return None
-    if deviations_elsewhere(ground) < REST_PEAK_DEVIATIONS:
+    if deviations_elsewhere(survey) < REST_PEAK_DEVIATIONS:
         return None
-    return "the ground between forests and settlements matches elsewhere"
+    is_open = evidence.scene.sensors is Sensors.RADARS
+    ground = "between forests and settlements" if is_open else "outside of cast shadows"
+    return f"the ground {ground} matches elsewhere"
 
 
 SURVEY_RULES: tuple[Rule, ...] = (
@@ -300,9 +302,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "ground elsewhere",
-        "between two radar images, what is neither forest nor settlement matches elsewhere about "
-        f"as well, and {REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual",
-        "suite calibration, SAR–SAR pairs",
+        "what is neither forest nor settlement in two radar images, or what no cast shadow may "
+        "darken in two camera images, matches elsewhere about as well, and "
+        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual",
+        "suites calibration and margins",
         ON_GROUND,
         _ground_elsewhere,
     ),
