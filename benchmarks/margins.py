@@ -98,10 +98,13 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
-def _share_of_ground(evidence: RegistrationEvidence) -> float:
+def _lit_ground(evidence: RegistrationEvidence) -> float:
+    """Return the height of a second place, as high, of what no cast shadow may darken."""
     ground = evidence.surveys.ground
-    is_peak = ground is not None and deviations_elsewhere(ground) >= REST_PEAK_DEVIATIONS
-    return ground.rival_height / max(ground.height, 0.1) if ground and is_peak else math.nan
+    if ground is None or evidence.scene.sensors is not Sensors.CAMERAS:
+        return math.nan
+    is_rival = ground.rival_height >= RIVAL_HEIGHT * ground.height
+    return deviations_elsewhere(ground) if is_rival else 0.0
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:
@@ -142,7 +145,7 @@ STATISTICS = (
         RIVAL_HEIGHT,
         _share_far_off,
     ),
-    Statistic("ground elsewhere: share of the height", RIVAL_HEIGHT, _share_of_ground),
+    Statistic("ground elsewhere: second place of cameras", PEAK_DEVIATIONS, _lit_ground),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),

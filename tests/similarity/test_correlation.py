@@ -65,19 +65,6 @@ def test_fields_against_their_definition(masked: bool) -> None:
     assert np.abs(found).max() <= 1
 
 
-def test_fields_that_do_not_overlap_correlate_by_0() -> None:
-    """Rounding of the sums is no value: a surface that consists of it has no scale."""
-    template, search, _, _ = fields(False)
-    template[:, 2:] = 0
-    search[:, 8:-6] = 0
-    found = correlate_fields(
-        template[None], search[None], np.ones(SHAPE, bool), np.abs(search) > 0
-    )[0]
-    overlaps = (np.abs(windows_of(search)[..., :2]) > 0).any(axis=(2, 3))
-    assert overlaps.any() and not overlaps.all()
-    np.testing.assert_array_equal(found != 0, overlaps)
-
-
 def test_a_field_agrees_with_itself_alone() -> None:
     template, search, template_valid, search_valid = fields(False)
     search[RADIUS + 2 : RADIUS + 2 + SHAPE[0], RADIUS - 1 : RADIUS - 1 + SHAPE[1]] = template

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..context import Context
 from ..geometry.transform import Transform
 from ..rasters.patch import Patch
@@ -15,7 +17,7 @@ from .chips import ChipMatcher
 from .coarse_shift import FarPlace
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
-from .parts import Part
+from .parts import MOST_OF_ONE, Part
 from .phase_survey import PHASES_REACH_PX, survey_unexplained
 from .shared_content import Sensors, SharedContent
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
@@ -140,6 +142,9 @@ def survey_all(
         lit = replace(on_level, part_of=_outside_shadows)
         once = replace(last, memo=None)
         ground = survey_model(matcher, lit, places, elsewhere_px, once)
+        # Chips of which scattered pixels are left may be higher than any evidence is.
+        limited = np.clip(ground.surfaces, -MOST_OF_ONE, MOST_OF_ONE)
+        ground = replace(ground, surfaces=limited)
     return Surveys(whole, rest, ground, unexplained=unexplained)
 
 

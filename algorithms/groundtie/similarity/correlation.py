@@ -173,19 +173,16 @@ def correlate_fields(
     """
     template_energy = template.real**2 + template.imag**2
     search_energy = search.real**2 + search.imag**2
-    own_energy = own_total = template_energy.sum(axis=(-2, -1), keepdims=True)
+    own_energy = template_energy.sum(axis=(-2, -1), keepdims=True)
     whole = search_valid.all(axis=(-2, -1), keepdims=True)
     if not whole.all():
         seen = correlate(template_energy, search_valid.astype(np.float32), workers)
-        own_energy = np.where(whole, own_total, seen)
+        own_energy = np.where(whole, own_energy, seen)
     energy = _sums_where(template_valid, search_energy, workers) * own_energy
     highest = energy.max(axis=(-2, -1), keepdims=True, initial=0)
     floor = np.float32(1e-6) * np.maximum(highest, np.float32(1e-12))
-    sums = correlate(template, search, workers)
-    # Where no valid parts of both fields overlap, sums are rounding: a last digit of both norms.
-    totals = own_total * search_energy.sum(axis=(-2, -1), keepdims=True)
-    known = (energy > floor) & (np.abs(sums) > np.finfo(np.float32).eps * np.sqrt(totals))
-    return np.where(known, sums / np.sqrt(np.maximum(energy, floor)), 0).astype(np.float32)
+    found = correlate(template, search, workers) / np.sqrt(np.maximum(energy, floor))
+    return np.where(energy > floor, found, 0).astype(np.float32)
 
 
 def correlate_grey(template: Patch, search: Patch) -> NDArray[np.float32]:

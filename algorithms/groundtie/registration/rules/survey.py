@@ -201,9 +201,9 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.surveys.ground
     if survey is None or not _has_rival(survey):
         return None
-    if deviations_elsewhere(survey) < REST_PEAK_DEVIATIONS:
-        return None
     is_open = evidence.scene.sensors is Sensors.RADARS
+    if deviations_elsewhere(survey) < (REST_PEAK_DEVIATIONS if is_open else PEAK_DEVIATIONS):
+        return None
     ground = "between forests and settlements" if is_open else "outside of cast shadows"
     return f"the ground {ground} matches elsewhere"
 
@@ -303,8 +303,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "ground elsewhere",
         "what is neither forest nor settlement in two radar images, or what no cast shadow may "
-        "darken in two camera images, matches elsewhere about as well, and "
-        f"{REST_PEAK_DEVIATIONS:g} robust standard deviations better than usual",
+        "darken in two camera images, matches elsewhere about as well, and by "
+        f"{REST_PEAK_DEVIATIONS:g} or {PEAK_DEVIATIONS:g} robust standard deviations better than "
+        "usual",
         "suites calibration and margins",
         ON_GROUND,
         _ground_elsewhere,
