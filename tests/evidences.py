@@ -26,6 +26,7 @@ from groundtie.matching.surveys import Rest, Surveys
 from groundtie.registration.evidence import Evidence, RegistrationEvidence
 from groundtie.registration.refinement import RefinementEvidence
 from groundtie.registration.scene import ImageFacts, SceneInfo
+from groundtie.registration.specification import BOTH, NEITHER
 from groundtie.registration.verdict import refusals
 from groundtie.sensor.adjustment import Control, adjust
 from groundtie.similarity.in_common import Sameness
@@ -190,6 +191,9 @@ def scene(
 ) -> SceneInfo:
     """Return what two images are, by given facts."""
     return SceneInfo(reference or facts(), input or facts(), declared)
+
+
+RADARS, CAMERAS = scene(declared=BOTH), scene(declared=NEITHER)
 
 
 def control(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
+    RADARS,
     displaced,
     estimated,
     facts,
@@ -67,7 +68,8 @@ def fallen_beyond(count: int) -> np.ndarray:
 @pytest.mark.parametrize(("rival", "expected"), [(1.7, ["ground elsewhere"]), (1.5, [])])
 def test_poses_of_canopies_are_refused(rival: float, expected: list[str]) -> None:
     ground = survey(height=2.0, rival=rival)
-    assert refusing(posed(scatter(21, 0.5), ground=ground)) == expected
+    found = replace(posed(scatter(21, 0.5), ground=ground), scene=RADARS)
+    assert refusing(found) == expected
 
 
 @pytest.mark.parametrize(("apart_px", "expected"), [(5.1, ["bands apart"]), (4.9, [])])
