@@ -26,6 +26,7 @@ from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     LEAST_OF_REST,
+    LIT_PEAK_DEVIATIONS,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
@@ -145,7 +146,7 @@ STATISTICS = (
         RIVAL_HEIGHT,
         _share_far_off,
     ),
-    Statistic("ground elsewhere: second place of cameras", PEAK_DEVIATIONS, _lit_ground),
+    Statistic("ground elsewhere: second place of cameras", LIT_PEAK_DEVIATIONS, _lit_ground),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),

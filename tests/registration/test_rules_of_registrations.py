@@ -68,15 +68,15 @@ def test_what_elevated_objects_displace_all_points_by_is_refused(
     ("images", "height", "where"),
     [
         (RADARS, 2.0, "between forests"),
-        (CAMERAS, 2.2, "outside of cast shadows"),
-        (CAMERAS, 2.0, None),
+        (CAMERAS, 1.5, "outside of cast shadows"),
+        (CAMERAS, 1.35, None),
     ],
 )
 def test_a_refusal_names_the_ground_that_lies_elsewhere(
     images: SceneInfo, height: float, where: str | None
 ) -> None:
-    """The mean of 49 chips of noise deviates by 1/7: 1.7 are 11.9 and 1.9 are 13 deviations."""
-    ground = survey(height=height, rival=height - 0.3)
+    """The mean of 49 chips of noise deviates by 1/7: 1.1 are 7.7 and 1.25 are 8.7 deviations."""
+    ground = survey(height=height, rival=height - 0.25)
     found = list(refusals(evidence(GOOD, scene=images, survey=survey(), ground=ground)))
     assert [rule.name for rule, _ in found] == ["ground elsewhere"] * (where is not None)
     assert where is None or where in found[0][1]
