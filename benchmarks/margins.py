@@ -25,8 +25,8 @@ from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
+    EVEN_PEAK_DEVIATIONS,
     LEAST_OF_REST,
-    LIT_PEAK_DEVIATIONS,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
@@ -99,8 +99,8 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
-def _lit_ground(evidence: RegistrationEvidence) -> float:
-    """Return the height of a second place, as high, of what no cast shadow may darken."""
+def _even_ground(evidence: RegistrationEvidence) -> float:
+    """Return the height of a second place, as high, without dark or bright pixels."""
     ground = evidence.surveys.ground
     if ground is None or evidence.scene.sensors is not Sensors.CAMERAS:
         return math.nan
@@ -146,7 +146,7 @@ STATISTICS = (
         RIVAL_HEIGHT,
         _share_far_off,
     ),
-    Statistic("ground elsewhere: second place of cameras", LIT_PEAK_DEVIATIONS, _lit_ground),
+    Statistic("ground elsewhere: second place of cameras", EVEN_PEAK_DEVIATIONS, _even_ground),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),

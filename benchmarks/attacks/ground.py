@@ -25,6 +25,8 @@ Shape = tuple[int, int]
 _FRACTION_BITS = 4
 _SIXTEENTHS = 2**_FRACTION_BITS
 
+Range = tuple[float, float]
+
 Draw = Callable[[Shape, np.random.Generator], Change]
 
 
@@ -148,12 +150,22 @@ def water_moved(pair: Pair, setting: Setting) -> Pair:
 
 def shadows_moved(pair: Pair, setting: Setting) -> Pair:
     """Scatter trees, whose shadows fall to another side in the input, over displaced dry ground."""
+    return _sides_moved(pair, setting, (0.65, 0.9), (0.15, 0.35))
+
+
+def bright_sides_moved(pair: Pair, setting: Setting) -> Pair:
+    """Scatter roofs, whose sunlit walls are seen on another side in the input."""
+    return _sides_moved(pair, setting, (1.1, 1.3), (1.5, 1.9))
+
+
+def _sides_moved(pair: Pair, setting: Setting, top: Range, side: Range) -> Pair:
+    """Scatter round objects by the ranges of the brightness of their tops and sides."""
     rng, shape = setting.rng, np.array(pair.reference.shape[1:])
     shift, apart = direction(rng, 0.0, 12.0), rng.uniform(9.0, 20.0)
     moved = pair.moved(shift, as_text(shift))
     number = int(np.prod(shape) / apart**2)
     trunks, radii = rng.uniform(0, 1, (number, 2)) * shape[::-1], rng.uniform(1.3, 3.0, number)
-    crown, shadow = rng.uniform(0.65, 0.9), rng.uniform(0.15, 0.35)
+    crown, shadow = rng.uniform(*top), rng.uniform(*side)
     length, contrast = rng.uniform(2.0, 3.5), rng.uniform(0.25, 0.7)
     azimuth = rng.uniform(0, 2 * np.pi)
     turn = np.deg2rad(rng.uniform(60, 120)) * rng.choice([-1, 1])
@@ -281,6 +293,7 @@ ATTACKS = [
     Attack(GROUND, "water moved", "", water_moved),
     Attack(GROUND, "moving clouds", "", moving_clouds, camera_only),
     Attack(GROUND, "shadows at another hour", "", shadows_moved, camera_only),
+    Attack(GROUND, "bright walls on another side", "", bright_sides_moved, camera_only),
     Attack(GROUND, "reference in one band", "", self_copy),
     Attack(GROUND, "reference in one band", "resampled", resampled(self_copy)),
     Attack(GROUND, "reference shines through", "", half_transparent_copy(False)),

@@ -91,14 +91,15 @@ def surveys_of(
         return survey_all(matcher, transform, places, accuracy_px, sensors, None, context)
 
 
+@pytest.mark.parametrize("contrast", [-6.0, 6.0])
 @pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
-def test_shadows_at_one_place_do_not_hide_that_the_ground_lies_elsewhere(
-    moved: tuple[int, int], tmp_path: Path, context: Context
+def test_shadows_and_roofs_do_not_hide_that_the_ground_lies_elsewhere(
+    moved: tuple[int, int], contrast: float, tmp_path: Path, context: Context
 ) -> None:
-    """Dark spots match where they coincide; what is not darkened, where the ground lies."""
+    """Dark and bright spots match where they coincide; the rest, where the ground lies."""
     at = np.random.default_rng(0).uniform(size=(SIDE, SIDE)) < 1 / 50
-    shadows = np.where(ndimage.binary_dilation(at, iterations=2), -6.0, 0.0)
-    images = (0.3 * noisy(place(to), seed) + shadows for to, seed in (((0, 0), 1), (moved, 2)))
+    spots = np.where(ndimage.binary_dilation(at, iterations=2), contrast, 0.0)
+    images = (0.3 * noisy(place(to), seed) + spots for to, seed in (((0, 0), 1), (moved, 2)))
     surveys = surveys_of(tmp_path, *images, context)
     assert surveys.whole is not None and surveys.ground is not None
     for survey, expected in ((surveys.whole, (0, 0)), (surveys.ground, moved)):

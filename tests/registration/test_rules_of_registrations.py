@@ -68,7 +68,7 @@ def test_what_elevated_objects_displace_all_points_by_is_refused(
     ("images", "height", "where"),
     [
         (RADARS, 2.0, "between forests"),
-        (CAMERAS, 1.5, "outside of cast shadows"),
+        (CAMERAS, 1.5, "outside of shadows and roofs"),
         (CAMERAS, 1.35, None),
     ],
 )

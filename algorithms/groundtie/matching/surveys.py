@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..context import Context
+from ..geometry.judging import RIVAL_HEIGHT
 from ..geometry.transform import Transform
 from ..rasters.patch import Patch
-from ..similarity.shadows import without_shadows
+from ..similarity.local_contrast import without_bright, without_dark
 from ..similarity.surface import SimilaritySettings
 from .chip_windows import Resampled
 from .chips import ChipMatcher
@@ -64,8 +65,8 @@ class Surveys:
         Without the content that is identical in both arrays; None: it is not looked for, because
         one image is rendered, or in the geometry of its sensor.
     ground
-        Of two radar images, of open ground; of two camera images, of what no cast shadow may
-        darken. None: the images are of both kinds or rendered, or open ground alone takes part.
+        Of two radar images, of open ground; of two camera images, without dark or bright pixels.
+        None: the images are of both kinds or rendered, or open ground alone takes part.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
@@ -139,17 +140,33 @@ def survey_all(
     if open_ground is not None:
         ground = survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)
     elif sensors is Sensors.CAMERAS:
-        lit = replace(on_level, part_of=_outside_shadows)
-        once = replace(last, memo=None)
-        ground = survey_model(matcher, lit, places, elsewhere_px, once)
-        # Chips of which scattered pixels are left may be higher than any evidence is.
-        limited = np.clip(ground.surfaces, -MOST_OF_ONE, MOST_OF_ONE)
-        ground = replace(ground, surfaces=limited)
+        ground = survey_even_ground(matcher, on_level, places, elsewhere_px, last)
     return Surveys(whole, rest, ground, unexplained=unexplained)
 
 
-def _outside_shadows(reference: Patch, input: Patch) -> tuple[Patch, Patch]:
-    return without_shadows(reference), without_shadows(input)
+def survey_even_ground(
+    matcher: ChipMatcher, images: Resampled, places: Places, elsewhere_px: float, context: Context
+) -> Survey:
+    """Survey two camera images without dark pixels, and without bright ones.
+
+    Shadows fall, and roofs are displaced, to another side at another hour or from another view.
+    Parameters as `survey_model`.
+
+    Returns
+    -------
+    Of both surveys the one with the higher second place, relative to the transform's own.
+    """
+    # Masks depend on the place, so descriptions cannot be reused.
+    once = replace(context, memo=None)
+
+    def left(part: Callable[[Patch], Patch]) -> Survey:
+        parts = replace(images, part_of=lambda one, other: (part(one), part(other)))
+        found = survey_model(matcher, parts, places, elsewhere_px, once)
+        # Chips of which scattered pixels are left may be higher than any evidence is.
+        return replace(found, surfaces=np.clip(found.surfaces, -MOST_OF_ONE, MOST_OF_ONE))
+
+    surveys = left(without_dark), left(without_bright)
+    return max(surveys, key=lambda survey: survey.rival_height - RIVAL_HEIGHT * survey.height)
 
 
 def survey_rest(

@@ -45,9 +45,9 @@ _LEAST_CHIPS = 0.25
 # two of them (suite margins, --seeds 87000-87029 --sample 120; none of one_grid).
 PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
 
-# The same outside of cast shadows: correct transforms reach 6.1, of filtered radar images, or 4.6;
+# The same without dark or bright pixels: correct transforms reach 6.1, of filtered radar images;
 # wrong ones have 10.0 and more (suites real, and margins, --classes "shadows at another hour").
-LIT_PEAK_DEVIATIONS = 8.0
+EVEN_PEAK_DEVIATIONS = 8.0
 
 # Nearer than this, roofs make such peaks under correct transforms, too: with 9 px instead, a suburb
 # that is correct to 0.6 px is refused (suite attacks: images exchanged/0/sim-suburban/register/
@@ -206,9 +206,9 @@ def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if survey is None or not _has_rival(survey):
         return None
     is_open = evidence.scene.sensors is Sensors.RADARS
-    if deviations_elsewhere(survey) < (REST_PEAK_DEVIATIONS if is_open else LIT_PEAK_DEVIATIONS):
+    if deviations_elsewhere(survey) < (REST_PEAK_DEVIATIONS if is_open else EVEN_PEAK_DEVIATIONS):
         return None
-    ground = "between forests and settlements" if is_open else "outside of cast shadows"
+    ground = "between forests and settlements" if is_open else "outside of shadows and roofs"
     return f"the ground {ground} matches elsewhere"
 
 
@@ -306,10 +306,10 @@ SURVEY_RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "ground elsewhere",
-        "what is neither forest nor settlement in two radar images, or what no cast shadow may "
-        "darken in two camera images, matches elsewhere about as well, and by "
+        "what is neither forest nor settlement in two radar images, or not dark or not bright in "
+        "two camera images, as cast shadows and roofs are, matches elsewhere about as well, and by "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, of camera images "
-        f"{LIT_PEAK_DEVIATIONS:g}, better than usual",
+        f"{EVEN_PEAK_DEVIATIONS:g}, better than usual",
         "suites calibration and margins",
         ON_GROUND,
         _ground_elsewhere,
