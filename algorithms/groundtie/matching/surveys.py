@@ -159,13 +159,13 @@ def survey_even_ground(
     # Masks depend on the place, so descriptions cannot be reused.
     once = replace(context, memo=None)
 
-    def left(part: Callable[[Patch], Patch]) -> Survey:
+    def left(part: Callable[[Patch], Patch], context: Context) -> Survey:
         parts = replace(images, part_of=lambda one, other: (part(one), part(other)))
-        found = survey_model(matcher, parts, places, elsewhere_px, once)
+        found = survey_model(matcher, parts, places, elsewhere_px, context)
         # Chips of which scattered pixels are left may be higher than any evidence is.
         return replace(found, surfaces=np.clip(found.surfaces, -MOST_OF_ONE, MOST_OF_ONE))
 
-    surveys = left(without_dark), left(without_bright)
+    surveys = left(without_dark, once.part(0.0, 0.5)), left(without_bright, once.part(0.5, 1.0))
     return max(surveys, key=lambda survey: survey.rival_height - RIVAL_HEIGHT * survey.height)
 
 
