@@ -101,11 +101,11 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
 
 def _even_ground(evidence: RegistrationEvidence) -> float:
     """Return the height of a second place, as high, without dark or bright pixels."""
-    ground = evidence.surveys.ground
-    if ground is None or evidence.scene.sensors is not Sensors.CAMERAS:
+    surveys = evidence.surveys.ground
+    if not surveys or evidence.scene.sensors is not Sensors.CAMERAS:
         return math.nan
-    is_rival = ground.rival_height >= RIVAL_HEIGHT * ground.height
-    return deviations_elsewhere(ground) if is_rival else 0.0
+    rivals = (one for one in surveys if one.rival_height >= RIVAL_HEIGHT * one.height)
+    return max(map(deviations_elsewhere, rivals), default=0.0)
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:

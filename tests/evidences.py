@@ -100,7 +100,7 @@ def evidence(
     *,
     survey: Survey | None = None,
     rest: Rest | None = None,
-    ground: Survey | None = None,
+    ground: Sequence[Survey] = (),
     unexplained: Survey | None = None,
     far: FarPlace | None = None,
     **more: Any,

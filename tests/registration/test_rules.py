@@ -245,8 +245,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(), rest=left_of_two_sensors(0.8, 1.1)),
     ),
     "ground elsewhere": (
-        evidence(GOOD, scene=RADARS, survey=survey(), ground=survey(height=2.0, rival=1.7)),
-        evidence(GOOD, scene=RADARS, survey=survey(), ground=survey(height=2.0, rival=1.5)),
+        evidence(GOOD, scene=RADARS, survey=survey(), ground=[survey(height=2.0, rival=1.7)]),
+        evidence(GOOD, scene=RADARS, survey=survey(), ground=[survey(height=2.0, rival=1.5)]),
     ),
     "narrow control": (
         refinement(control((20, -9), corner=0.2), kind="shift"),

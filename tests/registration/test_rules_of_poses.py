@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -41,7 +42,7 @@ def posed(
     layover_factor: float | None = None,
     is_shift: bool = False,
     rest: Rest | None = None,
-    ground: Survey | None = None,
+    ground: Sequence[Survey] = (),
     fine: Survey | None = None,
     **more: Any,
 ) -> PoseSurveyEvidence:
@@ -68,7 +69,7 @@ def fallen_beyond(count: int) -> np.ndarray:
 @pytest.mark.parametrize(("rival", "expected"), [(1.7, ["ground elsewhere"]), (1.5, [])])
 def test_poses_of_canopies_are_refused(rival: float, expected: list[str]) -> None:
     ground = survey(height=2.0, rival=rival)
-    found = replace(posed(scatter(21, 0.5), ground=ground), scene=RADARS)
+    found = replace(posed(scatter(21, 0.5), ground=[ground]), scene=RADARS)
     assert refusing(found) == expected
 
 

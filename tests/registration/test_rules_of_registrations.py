@@ -77,9 +77,17 @@ def test_a_refusal_names_the_ground_that_lies_elsewhere(
 ) -> None:
     """The mean of 49 chips of noise deviates by 1/7: 1.1 are 7.7 and 1.25 are 8.7 deviations."""
     ground = survey(height=height, rival=height - 0.25)
-    found = list(refusals(evidence(GOOD, scene=images, survey=survey(), ground=ground)))
+    found = list(refusals(evidence(GOOD, scene=images, survey=survey(), ground=[ground])))
     assert [rule.name for rule, _ in found] == ["ground elsewhere"] * (where is not None)
     assert where is None or where in found[0][1]
+
+
+def test_a_weak_survey_of_ground_does_not_hide_what_another_shows() -> None:
+    """Of 7 deviations and far above the transform's own place; of 8.7, and little below it."""
+    weak, clear = survey(height=0.1, rival=1.0), survey(height=1.5, rival=1.25)
+    for ground, expected in (([weak], []), ([weak, clear], ["ground elsewhere"])):
+        found = evidence(GOOD, scene=CAMERAS, survey=survey(), ground=ground)
+        assert refusing(found) == expected
 
 
 @pytest.mark.parametrize("folds", [0, 1, 5])

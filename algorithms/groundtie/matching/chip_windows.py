@@ -23,7 +23,7 @@ from .matcher import MaskOf, Places
 
 R = TypeVar("R")
 
-# Takes the reference and the input, and returns the part of the input that is compared.
+# Takes the reference and the input, and returns what of both is compared.
 PartOf = Callable[[Patch, Patch], tuple[Patch, Patch]]
 
 _Numbers = NDArray[np.intp]

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..context import Context
-from ..geometry.judging import RIVAL_HEIGHT
 from ..geometry.transform import Transform
 from ..rasters.patch import Patch
 from ..similarity.local_contrast import without_bright, without_dark
@@ -65,8 +64,9 @@ class Surveys:
         Without the content that is identical in both arrays; None: it is not looked for, because
         one image is rendered, or in the geometry of its sensor.
     ground
-        Of two radar images, of open ground; of two camera images, without dark or bright pixels.
-        None: the images are of both kinds or rendered, or open ground alone takes part.
+        Of two radar images, of open ground; of two camera images, without dark pixels, and without
+        bright ones. Empty if the images are of both kinds or rendered, or open ground alone takes
+        part.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
@@ -79,7 +79,7 @@ class Surveys:
 
     whole: Survey | None = None
     rest: Rest | None = None
-    ground: Survey | None = None
+    ground: Sequence[Survey] = ()
     fine: Survey | None = None
     unexplained: Survey | None = None
     far: FarPlace | None = None
@@ -129,7 +129,8 @@ def survey_all(
         on_level = matcher.resampled(transform.model, places.grid, SURVEY_RADIUS_PX, context)
     part = context.part(0.0, 0.4)
     whole = survey_model(matcher, on_level, places, elsewhere_px, part)
-    rest = ground = unexplained = None
+    rest, unexplained = None, None
+    ground: Sequence[Survey] = ()
     if sensors is not None:
         part = context.part(0.4, 0.9)
         both = images, on_level
@@ -138,23 +139,19 @@ def survey_all(
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     last = context.part(0.9, 1.0)
     if open_ground is not None:
-        ground = survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)
+        ground = [survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)]
     elif sensors is Sensors.CAMERAS:
-        ground = survey_even_ground(matcher, on_level, places, elsewhere_px, last)
+        ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, last)
     return Surveys(whole, rest, ground, unexplained=unexplained)
 
 
-def survey_even_ground(
+def _survey_even_ground(
     matcher: ChipMatcher, images: Resampled, places: Places, elsewhere_px: float, context: Context
-) -> Survey:
+) -> Sequence[Survey]:
     """Survey two camera images without dark pixels, and without bright ones.
 
     Shadows fall, and roofs are displaced, to another side at another hour or from another view.
     Parameters as `survey_model`.
-
-    Returns
-    -------
-    Of both surveys the one with the higher second place, relative to the transform's own.
     """
     # Masks depend on the place, so descriptions cannot be reused.
     once = replace(context, memo=None)
@@ -165,8 +162,7 @@ def survey_even_ground(
         # Chips of which scattered pixels are left may be higher than any evidence is.
         return replace(found, surfaces=np.clip(found.surfaces, -MOST_OF_ONE, MOST_OF_ONE))
 
-    surveys = left(without_dark, once.part(0.0, 0.5)), left(without_bright, once.part(0.5, 1.0))
-    return max(surveys, key=lambda survey: survey.rival_height - RIVAL_HEIGHT * survey.height)
+    return left(without_dark, once.part(0.0, 0.5)), left(without_bright, once.part(0.5, 1.0))
 
 
 def survey_rest(

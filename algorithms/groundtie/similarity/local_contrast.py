@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ..rasters.patch import Patch
-from .unexplained import centred
+from .unexplained import blurred, centred
 
 # A pixel is dark or bright if it differs from the mean of a window of this side, as wide as the
 # smallest chip of a survey, by so many standard deviations. Its neighbours may be mixed pixels.
@@ -30,13 +30,10 @@ def without_bright(patch: Patch) -> Patch:
 
 def _without(patch: Patch, sign: int) -> Patch:
     valid = patch.valid
-    values, known = centred(patch.values, valid), np.maximum(_blurred(valid), np.float32(1e-6))
-    mean = _blurred(values) / known
-    variance = np.maximum(_blurred(values * values) / known - mean * mean, 0)
+    values = centred(patch.values, valid)
+    known = np.maximum(blurred(valid, _WINDOW_PX), np.finfo(np.float32).eps)
+    mean = blurred(values, _WINDOW_PX) / known
+    variance = np.maximum(blurred(values * values, _WINDOW_PX) / known - mean * mean, 0)
     differs = valid & (sign * (values - mean) > np.float32(_DEVIATIONS) * np.sqrt(variance))
     around = cv2.dilate(differs.astype(np.uint8), _NEIGHBOURS) > 0
     return replace(patch, valid=valid & ~around)
-
-
-def _blurred(image: np.ndarray) -> np.ndarray:
-    return cv2.blur(image.astype(np.float32, copy=False), (_WINDOW_PX, _WINDOW_PX))

@@ -50,11 +50,11 @@ def _unexplained(whole_reference: Patch, whole_input: Patch, rows: range) -> Pat
         Patch(of.values[around], of.valid[around]) for of in (whole_reference, whole_input)
     )
     valid = reference.valid & input.valid
-    known = 1 if valid.all() else np.maximum(_blurred(valid), np.finfo(np.float32).eps)
+    known = 1 if valid.all() else np.maximum(blurred(valid), np.finfo(np.float32).eps)
     one, other = (centred(patch.values, valid) for patch in (input, reference))
 
     def mean(of: FloatImage) -> FloatImage:
-        return np.asarray(_blurred(of) / known, np.float32)
+        return np.asarray(blurred(of) / known, np.float32)
 
     means, square = (mean(one), mean(other)), mean(other * other)
     least = _LEAST_SHARE * square + np.finfo(np.float32).tiny
@@ -68,8 +68,9 @@ def _unexplained(whole_reference: Patch, whole_input: Patch, rows: range) -> Pat
     return Patch(np.where(shown[inner], left[inner], 0), shown[inner])
 
 
-def _blurred(stack: FloatImage | Mask) -> FloatImage:
-    size = WINDOW_PX, WINDOW_PX
+def blurred(stack: FloatImage | Mask, side_px: int = WINDOW_PX) -> FloatImage:
+    """Return the means in square windows around pixels, shape (…, h, w)."""
+    size = side_px, side_px
     return each(lambda image: cv2.blur(image, size), stack.astype(np.float32, copy=False))
 
 

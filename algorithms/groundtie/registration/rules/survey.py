@@ -202,11 +202,10 @@ def _nothing_else(evidence: RegistrationEvidence) -> str | None:
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    survey = evidence.surveys.ground
-    if survey is None or not _has_rival(survey):
-        return None
     is_open = evidence.scene.sensors is Sensors.RADARS
-    if deviations_elsewhere(survey) < (REST_PEAK_DEVIATIONS if is_open else EVEN_PEAK_DEVIATIONS):
+    least = REST_PEAK_DEVIATIONS if is_open else EVEN_PEAK_DEVIATIONS
+    rivals = filter(_has_rival, evidence.surveys.ground)
+    if all(deviations_elsewhere(survey) < least for survey in rivals):
         return None
     ground = "between forests and settlements" if is_open else "outside of shadows and roofs"
     return f"the ground {ground} matches elsewhere"
