@@ -72,6 +72,11 @@ def _excess(survey: Survey) -> float:
     return next((part.excess for part in parts), math.nan)
 
 
+def _excess_far_off(survey: Survey) -> float:
+    """Return how much higher unsupporting chips match together far off; NaN: they are few."""
+    return math.nan if survey.far is None else survey.far.excess
+
+
 def _without_drawn(evidence: RegistrationEvidence) -> Rest | None:
     """Return what remains without possibly drawn content; None: no such content."""
     rest = evidence.surveys.rest
@@ -99,13 +104,17 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
-def _even_ground(evidence: RegistrationEvidence) -> float:
-    """Return the height of a second place, as high, without dark or bright pixels."""
-    surveys = evidence.surveys.ground
-    if not surveys or evidence.scene.sensors is not Sensors.CAMERAS:
-        return math.nan
-    rivals = (one for one in surveys if one.rival_height >= RIVAL_HEIGHT * one.height)
-    return max(map(deviations_elsewhere, rivals), default=0.0)
+def _ground_of(sensors: Sensors) -> Callable[[RegistrationEvidence], float]:
+    """Return the height of a second place, as high, without what is dark or bright."""
+
+    def value(evidence: RegistrationEvidence) -> float:
+        surveys = evidence.surveys.ground
+        if not surveys or evidence.scene.sensors is not sensors:
+            return math.nan
+        rivals = (one for one in surveys if one.rival_height >= RIVAL_HEIGHT * one.height)
+        return max(map(deviations_elsewhere, rivals), default=0.0)
+
+    return value
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:
@@ -136,6 +145,7 @@ def _height_of_else(evidence: RegistrationEvidence) -> float:
 
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
+    Statistic("part elsewhere: excess far off", LEAST_EXCESS, _of_survey(_excess_far_off)),
     Statistic(
         "second place: share of the height",
         RIVAL_HEIGHT,
@@ -146,7 +156,16 @@ STATISTICS = (
         RIVAL_HEIGHT,
         _share_far_off,
     ),
-    Statistic("ground elsewhere: second place of cameras", EVEN_PEAK_DEVIATIONS, _even_ground),
+    Statistic(
+        "ground elsewhere: second place of cameras",
+        EVEN_PEAK_DEVIATIONS,
+        _ground_of(Sensors.CAMERAS),
+    ),
+    Statistic(
+        "ground elsewhere: second place of both kinds",
+        REST_PEAK_DEVIATIONS,
+        _ground_of(Sensors.DIFFERENT),
+    ),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),
     Statistic("pixel-locked content: height", WEAK_HEIGHT, _rest_height, False),

@@ -18,8 +18,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
-from groundtie.matching.coarse_shift import FarPlace
-from groundtie.matching.parts import ELSEWHERE_PX
+from groundtie.matching.parts import ELSEWHERE_PX, FarPlace
 from groundtie.matching.shared_content import Sensors, SharedContent
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Rest, Surveys

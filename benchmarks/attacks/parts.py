@@ -13,7 +13,9 @@ from .catalogue import PARTS, Attack, Make, Setting, direction
 from .overlays import smooth_noise
 from .pairs import Pair, join
 
-_NEAREST_PX, _FARTHEST_PX = 6.0, 20.0
+# How far off parts lie, in pixels: within the radius of the survey, and beyond.
+_NEAR, _FAR = (6.0, 20.0), (20.0, 70.0)
+
 # The whole input may be displaced, too, by up to this.
 _WHOLE_PX = 8.0
 
@@ -89,14 +91,15 @@ _PARTS: dict[str, Part] = {
 }
 
 
-def seam(part: Part) -> Make:
+def seam(part: Part, between_px: tuple[float, float] = _NEAR) -> Make:
     """A part is displaced against the rest; the rest is in place or displaced, too."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
         whole = direction(rng, 0.0, _WHOLE_PX) * rng.integers(0, 2)
-        low = max(_NEAREST_PX, 2 * pair.sigma_px + 4)
-        off = direction(rng, low, _FARTHEST_PX)
+        nearest_px, farthest_px = between_px
+        low = max(nearest_px, 2 * pair.sigma_px + 4)
+        off = direction(rng, low, farthest_px)
         moved = part(pair.input.shape[1:], rng)
         note = f"{moved.mean():.0%} off by ({off[0]:+.1f}, {off[1]:+.1f}) px against the rest"
         return pair.moved(whole + moved[..., None] * off, note)
@@ -201,6 +204,10 @@ ATTACKS = [
         Attack(PARTS, "a part of the reference lies off", name, in_the_reference(seam(part)))
         for name, part in _PARTS.items()
         if name in ("half", "third", "map tiles")
+    ),
+    *(
+        Attack(PARTS, "a part lies far off", name, seam(part, _FAR))
+        for name, part in _PARTS.items()
     ),
     Attack(PARTS, "strips lie off each by itself", "", own_strips),
     Attack(PARTS, "a part shows another place", "", half_of_another_place),

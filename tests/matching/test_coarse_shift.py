@@ -19,9 +19,9 @@ from groundtie.matching import coarse_shift
 from groundtie.matching.coarse_shift import (
     Candidate,
     coarse_candidates,
-    far_place,
     level_factor,
 )
+from groundtie.matching.far_places import FarSearch
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
@@ -76,9 +76,8 @@ def test_what_repeats_matches_as_well_some_periods_off(
         grown = sown[:side, :side] + rng.normal(0, 20, (side, side))
         paths.append(write_raster(tmp_path / f"{name}.tif", grown.astype(np.uint16)))
     with open_raster(paths[0]) as reference, open_raster(paths[1]) as input:
-        found = far_place(
-            make_pair(Image(reference), Image(input)), shift_model(0.0, 0.0), 24.0, context
-        )
+        pair = make_pair(Image(reference), Image(input))
+        found = FarSearch.of(pair, pair.grid, shift_model(0.0, 0.0), context).whole()
     assert found.is_rival
     # Along columns and rows whole periods, so that squares of distances are sums of two squares.
     periods2 = (found.distance_px / period) ** 2
@@ -89,10 +88,10 @@ def test_what_repeats_matches_as_well_some_periods_off(
 def test_what_does_not_repeat_matches_at_the_truth_alone(
     textured: TexturedPair, pair: ImagePair, context: Context
 ) -> None:
-    assert not far_place(pair, textured.truth.model, 24.0, context).is_rival
+    assert not FarSearch.of(pair, pair.grid, textured.truth.model, context).whole().is_rival
     # At a wrong model, the truth is the far place.
     wrong = shift_model(*(np.array([70.0, -45.0]) + [400.0, 0.0]))
-    found = far_place(pair, wrong, 24.0, context)
+    found = FarSearch.of(pair, pair.grid, wrong, context).whole()
     assert found.is_rival
     assert found.distance_px == pytest.approx(40.0, abs=2.0)
 

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import LEAST_EXCESS, find_parts
+from groundtie.matching.parts import (
+    LEAST_EXCESS,
+    find_parts,
+)
 
 RADIUS = 24
 COLS, ROWS = 7, 6

@@ -11,7 +11,7 @@ from turned_pairs import turned_pair
 
 from groundtie.context import Context
 from groundtie.matching.pose_survey import PoseSurvey, survey_pose
-from groundtie.matching.shared_content import Sensors
+from groundtie.matching.shared_content import ImageKinds, Sensors
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_windows import read_windows
 from groundtie.rasters.pair import Image, make_pair
@@ -37,7 +37,7 @@ def surveyed(
             images.append(Image(stack.enter_context(open_raster(path))))
         windows = read_windows(*images, (0.8, 1.25))
         pair = make_pair(*images, None, windows.radius_m, 180.0, 1.25)
-        return survey_pose(pair, windows.transform(pose), 0.02, Sensors.RADARS, None, context)
+        return survey_pose(pair, windows.transform(pose), 0.02, ImageKinds(Sensors.RADARS), context)
 
 
 # The true pose, and one with a tolerable error.

@@ -14,10 +14,11 @@ from groundtie.context import Context
 from groundtie.geometry.transform import Transform
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.locked import EXACT_PX
-from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.shared_content import Sensors
+from groundtie.matching.parts import ELSEWHERE_PX, Part
+from groundtie.matching.shared_content import ImageKinds, Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
 from groundtie.matching.surveys import Rest, Surveys, survey_all
+from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (
@@ -67,6 +68,7 @@ def surveys_of(
     offset: tuple[float, float] = (0.0, 0.0),
     sensors: Sensors = Sensors.CAMERAS,
     is_of_a_sensor: bool = False,
+    kinds: ImageKinds | None = None,
 ) -> Surveys:
     """Return the surveys of two arrays whose rows and columns are displaced by an offset.
 
@@ -88,7 +90,80 @@ def surveys_of(
         matcher = ChipMatcher(pair, SimilaritySettings())
         places = survey_places(pair.grid)
         accuracy_px = ELSEWHERE_PX, EXACT_PX
-        return survey_all(matcher, transform, places, accuracy_px, sensors, None, context)
+        return survey_all(
+            matcher, transform, places, accuracy_px, kinds or ImageKinds(sensors), False, context
+        )
+
+
+@pytest.mark.parametrize("off", [(40, -25), (-22, 0), (0, -70)])
+def test_a_part_beyond_the_radius_is_found(
+    off: tuple[int, int], tmp_path: Path, context: Context
+) -> None:
+    """Up to a quarter of the longer side; a strip of another pass, for instance."""
+    reference, displaced = far_apart(off)
+    input = reference.copy()
+    input[2 * SIDE // 3 :] = displaced[2 * SIDE // 3 :]
+    found = surveys_of(tmp_path, noisy(reference, 1, 0.5), noisy(input, 2, 0.5), context)
+    assert found.whole is not None
+    part = found.whole.parts[0]
+    assert part.shift_px == pytest.approx(off, abs=1.5)
+    assert part.where == "lower"
+    # Chips on the seam line may match either side.
+    assert part.chips == pytest.approx(len(found.whole.centres) / 3, rel=0.35)
+
+
+def test_a_forest_may_be_displaced_as_far_in_a_radar_image(
+    tmp_path: Path, context: Context
+) -> None:
+    reference, displaced = far_apart((35, 0))
+    input = reference.copy()
+    input[: SIDE // 3] = displaced[: SIDE // 3]
+    pair = noisy(reference, 1, 0.5), noisy(input, 2, 0.5)
+
+    def far(first_row: int, end_row: int) -> Part | None:
+        """Return the part far off if some rows are forest."""
+
+        def is_forest(piece: Grid) -> np.ndarray:
+            top = utm_grid(SIDE, SIDE).map_to_pixel(piece.pixel_to_map([[0.0, 0.0]]))[0, 1]
+            rows = top + np.arange(piece.height)
+            forest = (rows >= first_row) & (rows < end_row)
+            return np.broadcast_to(forest[:, None], (piece.height, piece.width))
+
+        kinds = ImageKinds(Sensors.DIFFERENT, open_ground=is_forest)
+        found = surveys_of(tmp_path, *pair, context, kinds=kinds)
+        assert found.whole is not None
+        return found.whole.far
+
+    assert far(0, SIDE // 3) is None
+    other = far(SIDE // 3, SIDE)
+    assert other is not None
+    assert other.shift_px == pytest.approx((35, 0), abs=1.5)
+
+
+@pytest.mark.parametrize("shows", ["another place", "nothing", "what lies there"])
+def test_what_does_not_match_is_no_part_far_off(
+    shows: str, tmp_path: Path, context: Context
+) -> None:
+    reference, _ = far_apart((0, 0))
+    input = reference.copy()
+    lower = slice(2 * SIDE // 3, None)
+    if shows == "another place":
+        input[lower] = texture(SIDE, SIDE, 5)[lower]
+    elif shows == "nothing":
+        input[lower] = 0.0
+    found = surveys_of(tmp_path, noisy(reference, 1, 0.5), noisy(input, 2, 0.5), context)
+    assert found.parts == []
+    assert found.whole is not None
+    # The place is not even looked for if most chips confirm the model.
+    assert (found.whole.far is None) == (shows == "what lies there")
+
+
+def far_apart(off: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a place, and the same displaced by a shift (x, y) of up to 90 px."""
+    margin = 90
+    canvas = texture(SIDE + 2 * margin, SIDE + 2 * margin, 4)
+    both = [canvas[margin - y :, margin - x :][:SIDE, :SIDE] for x, y in ((0, 0), off)]
+    return both[0], both[1]
 
 
 @pytest.mark.parametrize("contrast", [-6.0, 6.0])
@@ -107,6 +182,30 @@ def test_shadows_and_roofs_do_not_hide_that_the_ground_lies_elsewhere(
     for survey, expected in ((surveys.whole, (0, 0)), (without_spots, moved)):
         top = np.unravel_index(np.argmax(survey.mean), survey.mean.shape)
         assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(expected, abs=1)
+
+
+@pytest.mark.parametrize("is_input_radar", [False, True])
+@pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
+def test_bright_roofs_in_shadows_do_not_hide_that_the_ground_lies_elsewhere(
+    moved: tuple[int, int], is_input_radar: bool, tmp_path: Path, context: Context
+) -> None:
+    """What is bright in the radar image lies where the camera image has shadows."""
+    at = np.random.default_rng(0).uniform(size=(SIDE, SIDE)) < 1 / 50
+    spots = ndimage.binary_dilation(at, iterations=2)
+    images = [
+        0.3 * noisy(place(to), seed) + np.where(spots, contrast, 0.0)
+        for to, seed, contrast in (((0, 0), 1, 6.0), (moved, 2, -6.0))
+    ]
+    # The other way round the ground moves back.
+    expected = -np.array(moved) if is_input_radar else np.array(moved)
+    pair = images[::-1] if is_input_radar else images
+    kinds = ImageKinds(Sensors.DIFFERENT, is_input_radar)
+    surveys = surveys_of(tmp_path, pair[0], pair[1], context, kinds=kinds)
+    (without_spots,) = surveys.ground
+    assert surveys.whole is not None
+    for survey, shift in ((surveys.whole, (0, 0)), (without_spots, tuple(expected))):
+        top = np.unravel_index(np.argmax(survey.mean), survey.mean.shape)
+        assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(shift, abs=1)
 
 
 @pytest.mark.parametrize("share", [0.35, 0.6])

@@ -48,7 +48,7 @@ from groundtie.errors import (
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.used import GROUND, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
-from groundtie.matching.coarse_shift import FarPlace
+from groundtie.matching.parts import FarPlace
 from groundtie.matching.shared_content import Sensors
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.registration import evidence as stages
@@ -213,8 +213,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(rival=6.3)),
     ),
     "second place far off": (
-        evidence(GOOD, survey=survey(), far=FarPlace(10.0, 8.1, 60.0)),
-        evidence(GOOD, survey=survey(), far=FarPlace(10.0, 7.9, 60.0)),
+        evidence(GOOD, survey=survey(), far=FarPlace(10.0, 8.1, (60.0, 0.0))),
+        evidence(GOOD, survey=survey(), far=FarPlace(10.0, 7.9, (60.0, 0.0))),
     ),
     "weak similarity": (
         evidence(GOOD, survey=survey(height=1.9, rival=1.0)),

@@ -33,11 +33,12 @@ from evidences import (
 )
 from scipy.stats import binom
 
-from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
+from groundtie.masks.used import GROUND, LAYER, NONE, REFERENCE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
+from groundtie.matching.parts import LEAST_EXCESS, Part
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
-from groundtie.registration.evidence import ImagesEvidence, RegistrationEvidence
+from groundtie.registration.evidence import Evidence, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.scene import SceneInfo
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
 from groundtie.registration.verdict import refusals
@@ -397,3 +398,23 @@ def test_points_of_the_exchanged_pair_must_agree_with_the_transform(
 ) -> None:
     found = evidence(GOOD, exchanged=evidence(errors).held_out)
     assert refusing(found) == (["exchanged roles"] if is_refused else [])
+
+
+def test_a_part_may_lie_beyond_the_chips_surfaces() -> None:
+    def of(excess: float) -> Evidence:
+        far = Part("lower", (60.0, 0.0), excess, tuple(range(11)))
+        return evidence(GOOD, survey=replace(survey(38), far=far))
+
+    assert refusing(of(LEAST_EXCESS)) == ["part elsewhere"]
+    assert refusing(of(LEAST_EXCESS - 0.1)) == []
+
+
+@pytest.mark.parametrize(
+    ("images", "is_refused"),
+    [(RADARS, True), (scene(declared=REFERENCE), True), (CAMERAS, False)],
+)
+def test_ground_of_one_camera_must_stand_out_more(images: SceneInfo, is_refused: bool) -> None:
+    """A place elsewhere is seven times as high as the mean of 49 chips of noise."""
+    elsewhere = survey(height=1.2, rival=1.0)
+    found = evidence(GOOD, scene=images, survey=survey(), ground=[elsewhere])
+    assert refusing(found) == (["ground elsewhere"] if is_refused else [])

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canopies import draw_country
 from evidences import facts, scene
 from facts_of_pairs import FIELDS, TOWN, grey_values, opened, speckled
+from textured_pairs import shift_on_map
 
 from groundtie.kinds import AUTO
 from groundtie.masks.used import INPUT, REFERENCE
@@ -41,6 +43,28 @@ def test_what_is_bright_may_be_a_town(
 ) -> None:
     with opened(tmp_path, reference, input) as pair:
         assert SceneInfo.of(pair).may_be_town == expected
+
+
+def test_open_ground_is_looked_for_where_the_radar_image_shows_it(tmp_path: Path) -> None:
+    """In the reference, or in the input where a model places it; not in camera images."""
+    forest = draw_country(300, 0.4)
+    radar, camera = forest.seen(0, 2.0, 1), grey_values(0.02, 0.01)[:300, :300]
+    # The map's y axis points up.
+    model, moved = shift_on_map(25.0, -10.0), (25, 10)
+    with opened(tmp_path, radar, camera) as pair:
+        info = SceneInfo.of(pair, REFERENCE)
+        ground, piece = info.kinds_by(model).open_ground, pair.grid.window(90, 60, 70, 50)
+        assert ground is not None
+        assert np.array_equal(ground(piece), info.reference.open_ground(piece))
+    with opened(tmp_path, camera, radar) as pair:
+        info = SceneInfo.of(pair, INPUT)
+        kinds, piece = info.kinds_by(model), pair.grid.window(90, 60, 70, 50)
+        ground = kinds.open_ground
+        assert ground is not None and kinds.is_input_radar
+        there = pair.grid.window(90 + moved[0], 60 + moved[1], 70, 50)
+        assert 0.1 < ground(piece).mean() < 0.9
+        assert np.array_equal(ground(piece), info.input.open_ground(there))
+        assert SceneInfo.of(pair, NEITHER).kinds_by(model).open_ground is None
 
 
 def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
@@ -106,6 +130,30 @@ def test_a_users_mask_needs_no_speckle() -> None:
     for has_mask in (False, True):
         info = SceneInfo(town, facts(), has_user_mask=has_mask)
         assert info.is_despeckled_town != has_mask
+
+
+@pytest.mark.parametrize("mean_db", [-45.0, -12.0, 5.0])
+def test_decibels_show_what_amplitudes_show(tmp_path: Path, mean_db: float) -> None:
+    town = speckled(0.25)
+    folder = tmp_path / "decibels"
+    folder.mkdir()
+    decibels = 20 * np.log10(np.maximum(town / town.mean(), 10 ** (-15 / 20))) + mean_db
+    with opened(tmp_path, town, FIELDS) as pair, opened(folder, decibels, FIELDS) as other:
+        found, known = SceneInfo.of(other), SceneInfo.of(pair)
+        for one in (found, known):
+            assert one.is_town and one.radar_name == REFERENCE
+        assert found.radar.strong_share == pytest.approx(known.radar.strong_share, abs=0.01)
+        assert found.radar.variation2 == pytest.approx(known.radar.variation2, rel=0.05)
+
+
+@pytest.mark.parametrize(("mean", "deviation"), [(0.0, 1.0), (-0.3, 0.2), (0.0, 50.0), (0.0, 0.01)])
+def test_other_negative_values_show_no_radar(tmp_path: Path, mean: float, deviation: float) -> None:
+    """As of indices and standardised images."""
+    standard = (FIELDS - FIELDS.mean()) / FIELDS.std() * deviation + mean
+    with opened(tmp_path, standard, FIELDS) as pair:
+        info = SceneInfo.of(pair)
+        assert info.apparent is Sensors.CAMERAS
+        assert not info.is_town
 
 
 @pytest.mark.parametrize("looks", [1, 4, 20])

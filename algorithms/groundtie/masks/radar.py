@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..rasters.pair import Image
-from ..rasters.patch import Patch, middle_window
+from ..rasters.patch import Patch, is_logarithmic, middle_window
 from ..rasters.reading import FloatImage
 from ..speckle.statistics import homogeneous_variation2
 
@@ -18,16 +18,44 @@ SAMPLE_PX = 1024
 LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 
 
+# Backscatter in decibels, from the noise of a radar to corner reflectors.
+_LEAST_DB, _MOST_DB = -60.0, 40.0
+
+
 def variation2_of(image: Image) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
 
-    Grey values are assumed to be amplitudes.
+    Grey values are assumed to be amplitudes, or decibels.
     """
-    middle = middle_window(image.source.grid, SAMPLE_PX)
-    patch = Patch(*image.source.read(middle, image.band))
-    return homogeneous_variation2(power(patch), patch.valid)
+    patch = _sample(image)
+    amplitude = to_amplitude(patch) if _holds_decibels(patch) else patch
+    return homogeneous_variation2(power(amplitude), patch.valid)
+
+
+def is_in_decibels(image: Image) -> bool:
+    """Whether an image has the values of backscatter in decibels: many negative, none beyond.
+
+    Other images with as many negative values, such as standardised ones, mostly exceed that range,
+    or hardly vary if they are taken for decibels.
+    """
+    return image.source.dtype.kind != "u" and _holds_decibels(_sample(image))
+
+
+def to_amplitude(patch: Patch) -> Patch:
+    """Return the amplitudes of decibels."""
+    return Patch(np.float32(10) ** (patch.values / np.float32(20)), patch.valid)
 
 
 def power(patch: Patch) -> FloatImage:
     """Return the power of amplitudes, 0 where invalid."""
     return np.where(patch.valid, patch.values * patch.values, np.float32(0))
+
+
+def _sample(image: Image) -> Patch:
+    middle = middle_window(image.source.grid, SAMPLE_PX)
+    return Patch(*image.source.read(middle, image.band))
+
+
+def _holds_decibels(patch: Patch) -> bool:
+    known = patch.values[patch.valid]
+    return is_logarithmic(known) and known.min() >= _LEAST_DB and known.max() <= _MOST_DB

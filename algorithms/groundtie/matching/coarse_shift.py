@@ -1,23 +1,24 @@
-"""The coarse shift or pose, and places far from a model: exhaustive search of a reduced image."""
+"""The coarse shift or pose: exhaustive search of a reduced image."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.fitting import fit_model
-from ..geometry.judging import RIVAL_HEIGHT
 from ..geometry.models import Model, shift_model
 from ..geometry.transform import Transform
-from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, read_windows
+from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
 from ..rasters.grid import Grid, near_longitude
-from ..rasters.held_images import held_on_level
 from ..rasters.pair import Image, ImagePair, require_content
 from ..rasters.patch import Patch
-from ..similarity.correlation import MINIMUM_OVERLAP
+from ..similarity.correlation import MINIMUM_OVERLAP, overlap_share
 from ..similarity.description import BORDER_PX
 from ..similarity.peak import Peak, find_peak
 from ..similarity.peaks import suppress
@@ -33,13 +34,11 @@ MOST_CANDIDATES = 4
 _LOW = 0.4
 
 # Candidates nearer than this are the same, in pixels of the level.
-_SAME_PLACE = np.ones((2 * 4 + 1,) * 2, bool)
-
-# What a scene that repeats has in common with itself, whatever grows there: borders and roads.
-_EDGES = SimilaritySettings("orientation")
+SAME_PLACE_PX = 4
+_SAME_PLACE = np.ones((2 * SAME_PLACE_PX + 1,) * 2, bool)
 
 # Few bins keep counting over a large search window fast, and are enough for whole scenes.
-_BINS = 8
+LEVEL_BINS = 8
 
 
 @dataclass(frozen=True)
@@ -48,28 +47,6 @@ class Candidate:
 
     model: Model
     height: float
-
-
-@dataclass(frozen=True)
-class FarPlace:
-    """The best match of a whole pair far from a model, beside the model's own.
-
-    Parameters
-    ----------
-    own_height, height
-        Similarity at the model and at the far place, in robust standard deviations.
-    distance_px
-        Distance of the far place, in pixels of the matching grid.
-    """
-
-    own_height: float
-    height: float = 0.0
-    distance_px: float = 0.0
-
-    @property
-    def is_rival(self) -> bool:
-        """Whether the pair matches about as well there."""
-        return self.height >= RIVAL_HEIGHT * self.own_height
 
 
 def level_factor(grid: Grid) -> float:
@@ -105,7 +82,7 @@ def coarse_candidates(
         One of the images is constant or has no valid pixel in the overlap, perhaps due to its mask.
     """
     if settings.bins is None:
-        settings = replace(settings, bins=_BINS)
+        settings = replace(settings, bins=LEVEL_BINS)
     limits = pair.limits
     if limits.is_shift:
         nominal = shift_model(0.0, 0.0)
@@ -134,10 +111,9 @@ def _elsewhere(pose: Candidate, places: list[Peak], level: Grid) -> list[Candida
     The pose search keeps one shift for each rotation and scale, but repetitive scenes match at
     several. The pose's height is scaled by the similarity at each shift relative to its own.
     """
-    near_px = _SAME_PLACE.shape[0] // 2
 
     def is_own(place: Peak) -> bool:
-        return max(map(abs, place.shift_px)) <= near_px
+        return max(map(abs, place.shift_px)) <= SAME_PLACE_PX
 
     own = max((place.height for place in places if is_own(place)), default=0.0)
     if own <= 0:
@@ -165,7 +141,7 @@ def _places(
     radius_px = int(np.ceil(pair.limits.radius / min(level.pixel_sides_m))) + 1
     # At larger shifts the images overlap too little.
     radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
-    surface = _surface(pair, level, settings, held_out, context, model, radius_px)
+    surface, _ = level_surface(pair, level, settings, held_out, context, model, radius_px)
     found: list[Peak] = []
     for _ in range(MOST_CANDIDATES):
         peak = find_peak(surface)
@@ -177,39 +153,7 @@ def _places(
     return found
 
 
-def far_place(pair: ImagePair, model: Model, beyond_px: float, context: Context) -> FarPlace:
-    """Return where a whole pair matches best far from a model, by the orientation of its edges.
-
-    Shifts of up to a quarter of the longer side are compared.
-
-    Parameters
-    ----------
-    pair
-        The images.
-    model
-        The misregistration on the map.
-    beyond_px
-        Nearer places do not count, in pixels of the matching grid.
-    context
-        Threads.
-    """
-    factor = level_factor(pair.grid)
-    level = pair.grid.scaled(factor)
-    held = held_on_level(pair, level, context)
-    radius_px = int(DEFAULT_RADIUS_SHARE * max(level.size))
-    surface = _surface(held, level, _EDGES, None, context, model, radius_px)
-    shifts = np.arange(-radius_px, radius_px + 1)
-    distance_px = np.hypot(*np.meshgrid(shifts, shifts))
-    same_px = _SAME_PLACE.shape[0] // 2
-    own = float(surface[distance_px <= same_px].max())
-    is_far = distance_px > max(beyond_px / factor, 2 * same_px)
-    at = np.argmax(np.where(is_far, surface, -np.inf))
-    if not is_far.flat[at]:
-        return FarPlace(own)
-    return FarPlace(own, float(surface.flat[at]), float(distance_px.flat[at]) * factor)
-
-
-def _surface(
+def level_surface(
     pair: ImagePair,
     level: Grid,
     settings: SimilaritySettings,
@@ -217,20 +161,24 @@ def _surface(
     context: Context,
     model: Model,
     radius_px: int,
-) -> Surface:
-    """Return the similarity of a whole pair at shifts of up to a radius relative to a model."""
+) -> tuple[Surface, Callable[[], NDArray[np.float32]]]:
+    """Compare a whole pair at shifts of up to a radius relative to a model.
+
+    Returns
+    -------
+    The similarity, shape (2 radius_px + 1, 2 radius_px + 1); and a function that returns, in the
+    same shape, the share of the reference's valid pixels that meets valid ones.
+    """
     reach = radius_px + BORDER_PX
     reference, input = _patches(pair, level, model, reach, held_out, context)
     # Only the unmasked share of the input can overlap with the reference.
     valid = 1.0 if pair.input.mask is None else input.valid_share
-    return similarity_surface(
-        describe(reference, level.width * level.height, settings, context.memo),
-        describe(input, level.width * level.height, settings),
-        radius_px,
-        settings,
-        context.quiet(),
-        MINIMUM_OVERLAP * valid,
+    template = describe(reference, level.width * level.height, settings, context.memo)
+    search = describe(input, level.width * level.height, settings)
+    surface = similarity_surface(
+        template, search, radius_px, settings, context.quiet(), MINIMUM_OVERLAP * valid
     )
+    return surface, partial(overlap_share, template.patch, search.patch)
 
 
 def _patches(

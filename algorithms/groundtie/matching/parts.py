@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..geometry.judging import TOLERANCE_PX
+from ..geometry.judging import RIVAL_HEIGHT, TOLERANCE_PX
 from ..rasters.grid import FloatArray, Grid, mesh
 from .belief_propagation import Surfaces
 
@@ -25,7 +25,7 @@ from .belief_propagation import Surfaces
 # Of 607 correct transforms, canopies were as many in one (suites calibration --seeds 440-499 and,
 # large rural scenes, 440-565; simulated --seeds 201-206; real; attacks: controls --seeds
 # 33000-33039). A fifth of an image holds 7 of 49 chips.
-ELSEWHERE_PX, _CANOPIES_PX, _CANOPIES_SHARE = 2 * TOLERANCE_PX, 20.0, 1 / 8
+ELSEWHERE_PX, CANOPIES_PX, CANOPIES_SHARE = 2 * TOLERANCE_PX, 20.0, 1 / 8
 
 # Fewest chips of a part, and the largest similarity that one chip may contribute.
 _FEWEST_CHIPS = 3
@@ -35,9 +35,37 @@ MOST_OF_ONE = 7.0
 # higher these others are there than where the model predicts them: their sum over the square root
 # of their number, in standard deviations of noise. It must exceed what one chip may contribute: two
 # copies of one chip and a third by chance, 1.6 high as some of 81 are, leave 8.6 / √2 = 6.1.
+# A far place must exceed the model's own by as much.
 LEAST_EXCESS = MOST_OF_ONE
 
 _ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
+
+
+@dataclass(frozen=True)
+class FarPlace:
+    """The best match of a pair far from a model, beside the model's own.
+
+    Parameters
+    ----------
+    own_height, height
+        Similarity at the model and at the far place, in robust standard deviations.
+    shift_px
+        Shift (x, y) of the far place from the model's prediction, in pixels of the searched grid.
+    """
+
+    own_height: float
+    height: float = 0.0
+    shift_px: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def distance_px(self) -> float:
+        """Length of the shift."""
+        return float(np.hypot(*self.shift_px))
+
+    @property
+    def is_rival(self) -> bool:
+        """Whether the pair matches about as well there."""
+        return self.height >= RIVAL_HEIGHT * self.own_height
 
 
 @dataclass(frozen=True)
@@ -60,6 +88,19 @@ class Part:
     shift_px: tuple[float, float]
     excess: float
     members: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls,
+        grid: Grid,
+        centres: NDArray[np.int_],
+        members: NDArray[np.int_],
+        shift_px: tuple[float, float],
+        excess: float,
+    ) -> Part:
+        """Return the part of some members of a survey's chips, whose centres are given."""
+        where = _where(grid, centres[members].mean(axis=0))
+        return cls(where, shift_px, excess, tuple(map(int, members)))
 
     @property
     def chips(self) -> int:
@@ -95,10 +136,14 @@ def find_parts(
     while found := _highest_group(higher, are_neighbours, left, least):
         members, place, excess = found
         x, y = map(float, shifts[place])
-        if np.hypot(x, y) <= _CANOPIES_PX or len(members) >= _CANOPIES_SHARE * len(centres):
-            where = _where(grid, centres[members].mean(axis=0))
-            yield Part(where, (x, y), excess, tuple(map(int, members)))
+        if np.hypot(x, y) <= CANOPIES_PX or len(members) >= CANOPIES_SHARE * len(centres):
+            yield Part.of(grid, centres, members, (x, y), excess)
         left = np.setdiff1d(left, members)
+
+
+def largest_group(centres: NDArray[np.int_], which: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """Return the numbers of the largest group of neighbours among some chips, shape (n,)."""
+    return max(_connected(np.flatnonzero(which), _are_neighbours(centres)), key=len)
 
 
 def _highest_group(

@@ -26,8 +26,8 @@ from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
 from .frames import compose
-from .matcher import MaskOf, Places
-from .shared_content import Sensors
+from .matcher import Places
+from .shared_content import ImageKinds
 from .survey import SURVEY_RADIUS_PX, survey_model, survey_places
 from .surveys import Surveys, survey_all
 
@@ -85,8 +85,7 @@ def survey_pose(
     pair: ImagePair,
     transform: Transform,
     accuracy_share: float,
-    sensors: Sensors,
-    open_ground: MaskOf | None,
+    kinds: ImageKinds,
     context: Context,
 ) -> PoseSurvey:
     """Match chips all over a pair around a pose.
@@ -99,10 +98,8 @@ def survey_pose(
         The pose, as a transform between the images.
     accuracy_share
         Accuracy of the pose, as a share of the reference's longer side.
-    sensors
-        Kinds of sensors that the images may come from.
-    open_ground
-        Returns which pixels of two radar images are not open ground; None: not known.
+    kinds
+        What the images are.
     context
         Threads and progress.
     """
@@ -121,7 +118,7 @@ def survey_pose(
     elsewhere_px = max(accuracy_share * max(level.size), POSE_TOLERANCE_PX)
     moved = Transform(model, transform.crs, transform.input_grid)
     accuracy_px = elsewhere_px, _EXACT_PX
-    surveys = survey_all(matcher, moved, places, accuracy_px, sensors, open_ground, quiet)
+    surveys = survey_all(matcher, moved, places, accuracy_px, kinds, False, quiet)
     smaller = survey_places(level)
     if smaller.chip_px < places.chip_px:
         images = matcher.resampled(model, level, SURVEY_RADIUS_PX, quiet)

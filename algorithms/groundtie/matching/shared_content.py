@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ..similarity.in_common import Sameness
+from .matcher import MaskOf
 
 
 class Sensors(Enum):
@@ -14,6 +15,27 @@ class Sensors(Enum):
     CAMERAS = "cameras"
     RADARS = "radars"
     DIFFERENT = "radar and camera"
+
+
+@dataclass(frozen=True)
+class ImageKinds:
+    """What surveys need to know of the images of a pair.
+
+    Parameters
+    ----------
+    sensors
+        Kinds of sensors that the images may come from; None: one is rendered from heights, and has
+        no drawn content.
+    is_input_radar
+        Of a radar and a camera image, whether the input is the radar's.
+    open_ground
+        Returns which pixels of a radar image are not open ground, of two that of the reference;
+        None: there is no radar image, or open ground is not asked for.
+    """
+
+    sensors: Sensors | None
+    is_input_radar: bool = False
+    open_ground: MaskOf | None = None
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from .belief_propagation import Surfaces
 from .chip_windows import Resampled
 from .chips import LEAST_VALID_MASKED, ChipMatcher
 from .matcher import MaskOf, Places
-from .parts import ELSEWHERE_PX, MOST_OF_ONE, Part, find_parts
+from .parts import ELSEWHERE_PX, LEAST_EXCESS, MOST_OF_ONE, Part, find_parts
 
 # Range of the chips' side, number of chips side by side along the grid's shorter side if that range
 # allows it, and the most along any side.
@@ -28,6 +28,10 @@ _CHIP_RANGE_PX, _ALONG, _MOST_ALONG = (40, 64), 7, 9
 
 # Largest shift of a part.
 SURVEY_RADIUS_PX = 24
+
+# A chip supports a model if it is as high where the model predicts it, in robust standard
+# deviations: noise within the tolerance seldom is.
+_SUPPORT = 3.0
 
 # A peak is the highest value in the neighbourhood that counts as one place.
 _NEIGHBOURS = np.ones((2 * int(TOLERANCE_PX) + 1,) * 2, np.uint8)
@@ -50,6 +54,9 @@ class Survey:
         surface, shape (n, 2 r + 1, 2 r + 1).
     elsewhere_px
         Common shifts of all chips beyond this distance are second places.
+    far
+        Unsupporting chips and where they match best together, beyond the surfaces' radius, evident
+        or not; None: they are too few.
     """
 
     grid: Grid
@@ -57,6 +64,7 @@ class Survey:
     shifts_px: FloatArray
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
+    far: Part | None = None
 
     @cached_property
     def mean(self) -> Surface:
@@ -67,6 +75,12 @@ class Survey:
     def is_confirming_chip(self) -> NDArray[np.bool_]:
         """Which chips match where the model predicts them, shape (n,)."""
         return np.asarray(np.hypot(*self.shifts_px.T) <= TOLERANCE_PX)
+
+    @property
+    def is_unsupporting_chip(self) -> NDArray[np.bool_]:
+        """Which chips hardly match where the model predicts them, shape (n,)."""
+        near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
+        return np.asarray(near.max(axis=1) < _SUPPORT)
 
     @property
     def confirming(self) -> int:
@@ -134,8 +148,9 @@ class Survey:
 
     @cached_property
     def parts(self) -> Sequence[Part]:
-        """Groups of chips that together match elsewhere, the most evident first."""
-        return list(find_parts(self.grid, self.centres, self.surfaces))
+        """Groups of chips that together match elsewhere, a far one first, then the most evident."""
+        far = [] if self.far is None or self.far.excess < LEAST_EXCESS else [self.far]
+        return [*far, *find_parts(self.grid, self.centres, self.surfaces)]
 
 
 def survey_places(grid: Grid) -> Places:

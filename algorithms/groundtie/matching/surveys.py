@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..context import Context
 from ..geometry.transform import Transform
-from ..rasters.patch import Patch
 from ..similarity.local_contrast import without_bright, without_dark
 from ..similarity.surface import SimilaritySettings
-from .chip_windows import Resampled
+from .chip_windows import PartOf, Resampled
 from .chips import ChipMatcher
-from .coarse_shift import FarPlace
+from .far_places import FarSearch
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
-from .parts import MOST_OF_ONE, Part
+from .parts import MOST_OF_ONE, FarPlace, Part
 from .phase_survey import PHASES_REACH_PX, survey_unexplained
-from .shared_content import Sensors, SharedContent
+from .shared_content import ImageKinds, Sensors, SharedContent
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 
 # In images that are not of two radars or one camera, windows that vary alike and edges that
@@ -64,9 +63,9 @@ class Surveys:
         Without the content that is identical in both arrays; None: it is not looked for, because
         one image is rendered, or in the geometry of its sensor.
     ground
-        Of two radar images, of open ground; of two camera images, without dark pixels, and without
-        bright ones. Empty if the images are of both kinds or rendered, or open ground alone takes
-        part.
+        Of two radar images, of open ground, unless it alone takes part; of two camera images,
+        without dark pixels, and without bright ones; of both kinds, without the radar's bright and
+        the camera's dark pixels. Empty if one is rendered.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
@@ -96,8 +95,8 @@ def survey_all(
     transform: Transform,
     places: Places,
     accuracy_px: tuple[float, float],
-    sensors: Sensors | None,
-    open_ground: MaskOf | None,
+    kinds: ImageKinds,
+    may_repeat: bool,
     context: Context,
 ) -> Surveys:
     """Match chips all over a pair around a transform, in each way that the rules ask for.
@@ -113,22 +112,24 @@ def survey_all(
     accuracy_px
         Two limits. A match of all chips farther than the first from the transform's prediction is
         a second place. A transform within the second of whole pixels shifts the array by them.
-    sensors
-        Kinds of sensors that the images may come from; None: one is rendered from heights, and
-        has no drawn content.
-    open_ground
-        Returns which pixels of two radar images are not open ground; None: no survey of it.
+    kinds
+        What the images are.
+    may_repeat
+        Whether to compare the whole pair beyond the surveys' radius, too.
     context
         Threads and progress.
     """
-    pair, elsewhere_px = matcher.pair, accuracy_px[0]
+    pair, elsewhere_px, sensors = matcher.pair, accuracy_px[0], kinds.sensors
     # Resampled once for all surveys; chips may extend a pixel beyond the grid.
     images = Resampled.of(pair, transform, pair.grid, PHASES_REACH_PX + 1, context)
     on_level = images
     if places.grid.pixel_size != pair.grid.pixel_size:
         on_level = matcher.resampled(transform.model, places.grid, SURVEY_RADIUS_PX, context)
     part = context.part(0.0, 0.4)
+    search = FarSearch.of(pair, places.grid, transform.model, context.quiet())
     whole = survey_model(matcher, on_level, places, elsewhere_px, part)
+    whole = search.with_far(whole, places.chip_px, kinds.open_ground)
+    far = search.whole() if may_repeat else None
     rest, unexplained = None, None
     ground: Sequence[Survey] = ()
     if sensors is not None:
@@ -138,31 +139,48 @@ def survey_all(
         if rest is not None:  # else there is no map layer that the ground could lie beneath
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     last = context.part(0.9, 1.0)
-    if open_ground is not None:
-        ground = [survey_model(matcher, on_level, places, elsewhere_px, last, open_ground)]
-    elif sensors is Sensors.CAMERAS:
-        ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, last)
-    return Surveys(whole, rest, ground, unexplained=unexplained)
+    if sensors is Sensors.RADARS and kinds.open_ground is not None:
+        ground = [survey_model(matcher, on_level, places, elsewhere_px, last, kinds.open_ground)]
+    elif sensors in (Sensors.CAMERAS, Sensors.DIFFERENT):
+        ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, kinds, last)
+    return Surveys(whole, rest, ground, unexplained=unexplained, far=far)
 
 
 def _survey_even_ground(
-    matcher: ChipMatcher, images: Resampled, places: Places, elsewhere_px: float, context: Context
+    matcher: ChipMatcher,
+    images: Resampled,
+    places: Places,
+    elsewhere_px: float,
+    kinds: ImageKinds,
+    context: Context,
 ) -> Sequence[Survey]:
-    """Survey two camera images without dark pixels, and without bright ones.
+    """Survey a pair without what is dark or bright as shadows, roofs and walls are.
 
-    Shadows fall, and roofs are displaced, to another side at another hour or from another view.
-    Parameters as `survey_model`.
+    Shadows fall, and roofs are displaced, to another side at another hour or from another view. In
+    a radar image roofs and walls are bright, where a camera's has shadows beside them. Parameters
+    as `survey_all` and `survey_model`.
     """
+    ways: Sequence[PartOf]
+    if kinds.sensors is Sensors.CAMERAS:
+        ways = [
+            lambda one, other: (without_dark(one), without_dark(other)),
+            lambda one, other: (without_bright(one), without_bright(other)),
+        ]
+    elif kinds.is_input_radar:
+        ways = [lambda camera, radar: (without_dark(camera), without_bright(radar))]
+    else:
+        ways = [lambda radar, camera: (without_bright(radar), without_dark(camera))]
     # Masks depend on the place, so descriptions cannot be reused.
     once = replace(context, memo=None)
 
-    def left(part: Callable[[Patch], Patch], context: Context) -> Survey:
-        parts = replace(images, part_of=lambda one, other: (part(one), part(other)))
-        found = survey_model(matcher, parts, places, elsewhere_px, context)
+    def survey(number: int) -> Survey:
+        parts = replace(images, part_of=ways[number])
+        part = once.part(number / len(ways), (number + 1) / len(ways))
+        found = survey_model(matcher, parts, places, elsewhere_px, part)
         # Chips of which scattered pixels are left may be higher than any evidence is.
         return replace(found, surfaces=np.clip(found.surfaces, -MOST_OF_ONE, MOST_OF_ONE))
 
-    return left(without_dark, once.part(0.0, 0.5)), left(without_bright, once.part(0.5, 1.0))
+    return [survey(number) for number in range(len(ways))]
 
 
 def survey_rest(

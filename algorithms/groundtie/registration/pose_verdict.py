@@ -200,7 +200,7 @@ def confirm_pose(
     pair = make_pair(*images, None, windows.radius_m, 180.0, scale)
     scene = SceneInfo.of(pair)
     transform = windows.transform(pose)
-    found = survey_pose(pair, transform, SAME_SHARE, scene.sensors, scene.open_ground, context)
+    found = survey_pose(pair, transform, SAME_SHARE, scene.kinds_by(transform.model), context)
     factor = CHIPS_MEAN_OVER_SCATTER if scene.sensors is Sensors.RADARS else None
     moved = windows.pose(found.transform)
     grid, shift = windows.reference_grid, Pose(shift_px=moved.shift_px)

@@ -5,22 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
+import numpy as np
+
 from ..context import Context
+from ..geometry.models import Model
 from ..kinds import AUTO
 from ..masks.ground import shows_ground
 from ..masks.open_ground import OpenGround
-from ..masks.radar import LEAST_VARIATION2, LEAST_VARIATION2_RATIO, variation2_of
+from ..masks.radar import (
+    LEAST_VARIATION2,
+    LEAST_VARIATION2_RATIO,
+    is_in_decibels,
+    to_amplitude,
+    variation2_of,
+)
 from ..masks.scene import Scene
 from ..masks.town import PERHAPS_TOWN_SHARE, TOWN_SHARE, share_of_strong_scatterers
 from ..masks.used import INPUT, REFERENCE
 from ..matching.band_shifts import BandShift, band_shifts
-from ..matching.shared_content import Sensors
-from ..rasters.grid import PointFunction
+from ..matching.matcher import MaskOf
+from ..matching.shared_content import ImageKinds, Sensors
+from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import Image, ImagePair
+from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
+from ..rasters.reading import Mask, Window
 from ..sensor.orientation import SensorGrid
 from .specification import BOTH, NEITHER
 
@@ -120,9 +132,7 @@ class SceneInfo:
     @classmethod
     def of(cls, pair: ImagePair, declared: str = AUTO) -> SceneInfo:
         """Return the facts of a pair, with the masks that the user gave."""
-        reference, input = (
-            ImageFacts(getattr(pair, name), scene_of(pair, name)) for name in (REFERENCE, INPUT)
-        )
+        reference, input = (_facts_of(pair, name) for name in (REFERENCE, INPUT))
         return cls(reference, input, declared, pair.is_ground_masked)
 
     def prepare(self, context: Context) -> None:
@@ -200,6 +210,32 @@ class SceneInfo:
     def open_ground(self) -> OpenGround | None:
         """The open ground of the reference; None: the images are not two radars'."""
         return self.reference.open_ground if self.sensors is Sensors.RADARS else None
+
+    def kinds_by(self, model: Model) -> ImageKinds:
+        """Return what surveys of a model on the map need to know of the images."""
+        is_input_radar = self.sensors is Sensors.DIFFERENT and self.radar_name == INPUT
+        return ImageKinds(self.sensors, is_input_radar, self._open_ground_by(model))
+
+    def _open_ground_by(self, model: Model) -> MaskOf | None:
+        """Return a mask of what is not open ground in a radar image; None: there is none.
+
+        It is that of the reference, or that of the input as a model on the map places it; pieces
+        are moved there, but not rotated. It is found when first asked for.
+        """
+        if self.sensors is Sensors.CAMERAS:
+            return None
+
+        def of_reference(piece: Grid) -> Mask:
+            return self.reference.open_ground(piece)
+
+        def of_input(piece: Grid) -> Mask:
+            middle = np.array([[piece.width - 1, piece.height - 1]]) / 2
+            moved = piece.map_to_pixel(model(piece.pixel_to_map(middle))) - middle
+            col, row = (int(n) for n in np.rint(moved[0]))
+            return self.input.open_ground(piece.window(col, row, *piece.size))
+
+        is_of_reference = self.sensors is Sensors.RADARS or self.radar_name == REFERENCE
+        return of_reference if is_of_reference else of_input
 
     @property
     def is_town(self) -> bool:
@@ -289,6 +325,17 @@ def scene_of(pair: ImagePair, name: str) -> Scene:
     """Return one image of a pair on the matching grid, as far as searches may reach."""
     (image, to_px), grid = located(pair, name), pair.surroundings
     return Scene(grid, lambda at: image.read_onto(grid.window(*at), to_px), image.source)
+
+
+def _facts_of(pair: ImagePair, name: str) -> ImageFacts:
+    """Return the facts about an image; they are found in amplitudes, also those of decibels."""
+    image, scene = located(pair, name)[0], scene_of(pair, name)
+    in_decibels = cache(lambda: is_in_decibels(image))
+
+    def read(at: Window) -> Patch:
+        return to_amplitude(scene.read(at)) if in_decibels() else scene.read(at)
+
+    return ImageFacts(image, replace(scene, read=read))
 
 
 def located(pair: ImagePair, name: str) -> tuple[Image, PointFunction]:

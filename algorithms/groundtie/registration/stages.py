@@ -15,7 +15,6 @@ from ..masks.used import NONE
 from ..matching.alignment import LINEAR_CANDIDATES, TERRAIN_CANDIDATES
 from ..matching.check import Check, check_model
 from ..matching.chips import ChipMatcher
-from ..matching.coarse_shift import far_place
 from ..matching.held_out import HeldOut
 from ..matching.keypoint_fit import GuidedFit, KeypointFit
 from ..matching.keypoints import KeypointMatcher
@@ -23,9 +22,9 @@ from ..matching.locked import EXACT_PX
 from ..matching.parts import ELSEWHERE_PX
 from ..matching.pooled import PooledHistogramMatcher
 from ..matching.pyramid import find_coarse_model
-from ..matching.shared_content import Sensors
+from ..matching.shared_content import ImageKinds, Sensors
 from ..matching.surface_fit import SurfaceFit, SurfaceMatcher
-from ..matching.survey import SURVEY_RADIUS_PX, survey_places
+from ..matching.survey import survey_places
 from ..matching.surveys import Surveys, survey_all
 from ..rasters.grid import Grid
 from ..rasters.pair import ImagePair
@@ -127,19 +126,22 @@ class Stages:
         if self.spec.is_placed:
             return Surveys()
         chips = ChipMatcher(self.masked.pair, SimilaritySettings(self.spec.similarity))
-        surveys = survey_all(
+        return survey_all(
             chips,
             estimate.transform,
             survey_places(chips.pair.grid),
             (ELSEWHERE_PX, EXACT_PX),
-            None if self.spec.is_rendered else self.masked.scene.sensors,
-            self.masked.scene.open_ground if self.masked.used.kind == NONE else None,
-            context.part(0.0, 0.9),
+            self._kinds(estimate.transform.model),
+            not (self.spec.is_rendered or self.masked.used.leaves_little),
+            context,
         )
-        if self.spec.is_rendered or self.masked.used.leaves_little:
-            return surveys
-        model, quiet = estimate.transform.model, context.quiet()
-        return replace(surveys, far=far_place(chips.pair, model, SURVEY_RADIUS_PX, quiet))
+
+    def _kinds(self, model: Model) -> ImageKinds:
+        """Return what surveys need to know of the images; a ground mask needs no open ground."""
+        if self.spec.is_rendered:
+            return ImageKinds(None)
+        kinds = self.masked.scene.kinds_by(model)
+        return kinds if self.masked.used.kind == NONE else replace(kinds, open_ground=None)
 
     def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
         """Return the evidence for the rules."""

@@ -61,7 +61,11 @@ def parts_map(survey: Survey) -> Figure:
         other[list(part.members)] = False
     px = survey.centres.astype(float)
     farthest_px = max(part.distance_px for part in parts)
-    arrows = figures.scaled_arrows(survey.shifts_px, farthest_px, 0.1, grid)
+    # Chips of a part share its shift; the match of a single one may be farther than it reaches.
+    shifts_px = survey.shifts_px.copy()
+    for part in parts:
+        shifts_px[list(part.members)] = part.shift_px
+    arrows = figures.scaled_arrows(shifts_px, farthest_px, 0.1, grid)
     axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
     axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
     for k, part in enumerate(parts):

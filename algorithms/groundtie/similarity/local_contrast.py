@@ -1,4 +1,4 @@
-"""Camera images without pixels that differ from their surroundings, as shadows and roofs do."""
+"""Images without pixels that differ from their surroundings, as shadows, roofs and walls do."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def without_dark(patch: Patch) -> Patch:
 
 
 def without_bright(patch: Patch) -> Patch:
-    """Return an image, shape (h, w), with bright pixels masked, such as roofs and sunlit walls."""
+    """Return an image, shape (h, w), with bright pixels masked, such as roofs and walls."""
     return _without(patch, 1)
 
 

@@ -7,7 +7,12 @@ from dataclasses import replace
 
 from ...geometry.judging import RIVAL_HEIGHT
 from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
-from ...matching.parts import ELSEWHERE_PX, LEAST_EXCESS
+from ...matching.parts import (
+    CANOPIES_PX,
+    CANOPIES_SHARE,
+    ELSEWHERE_PX,
+    LEAST_EXCESS,
+)
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
@@ -61,7 +66,9 @@ def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
     if not parts:
         return None
     part = parts[0]
-    return f"{part.chips} chips around the {part.where} match {part.distance_px:.1f} px off"
+    return (
+        f"{part.chips} chips around the {part.where} match {part.distance_px:.1f} px off together"
+    )
 
 
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
@@ -202,11 +209,12 @@ def _nothing_else(evidence: RegistrationEvidence) -> str | None:
 
 
 def _ground_elsewhere(evidence: RegistrationEvidence) -> str | None:
-    is_open = evidence.scene.sensors is Sensors.RADARS
-    least = REST_PEAK_DEVIATIONS if is_open else EVEN_PEAK_DEVIATIONS
+    sensors = evidence.scene.sensors
+    least = EVEN_PEAK_DEVIATIONS if sensors is Sensors.CAMERAS else REST_PEAK_DEVIATIONS
     rivals = filter(_has_rival, evidence.surveys.ground)
     if all(deviations_elsewhere(survey) < least for survey in rivals):
         return None
+    is_open = sensors is Sensors.RADARS
     ground = "between forests and settlements" if is_open else "outside of shadows and roofs"
     return f"the ground {ground} matches elsewhere"
 
@@ -215,7 +223,11 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "part elsewhere",
         "three neighbouring chips or more match better at one other place than where the transform "
-        f"has them: all but the highest together by {LEAST_EXCESS:g} standard deviations of noise",
+        f"has them: all but the highest together by {LEAST_EXCESS:g} standard deviations of noise. "
+        f"Or chips that hardly match where it has them, {CANOPIES_SHARE:.1%} or more, together "
+        f"match more than {CANOPIES_PX:g} px and up to a quarter of the longer side off, by "
+        f"{LEAST_EXCESS:g} robust standard deviations better; in a radar image, chips of open "
+        "ground alone",
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
@@ -306,7 +318,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "ground elsewhere",
         "what is neither forest nor settlement in two radar images, or not dark or not bright in "
-        "two camera images, as cast shadows and roofs are, matches elsewhere about as well, and by "
+        "two camera images, or neither bright in a radar nor dark in a camera image, as roofs and "
+        "cast shadows are, matches elsewhere about as well, and by "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, of camera images "
         f"{EVEN_PEAK_DEVIATIONS:g}, better than usual",
         "suites calibration and margins",
