@@ -55,11 +55,13 @@ def noisy(image: Image, rng: np.random.Generator) -> tuple[Image, Moved]:
 
 
 def lower_part(
-    low_px: float, high_px: float, image: Image, rng: np.random.Generator
+    image: Image,
+    rng: np.random.Generator,
+    between_px: tuple[float, float] = (6.0, 20.0),
 ) -> tuple[Image, Moved]:
     """Move the lower 30 to 60 % of the rows, as if they were a strip of another pass."""
     first = int(image.shape[1] * rng.uniform(0.4, 0.7))
-    right, down = (int(n) for n in np.rint(direction(rng, low_px, high_px)))
+    right, down = (int(n) for n in np.rint(direction(rng, *between_px)))
     made = image.copy()
     moved = np.roll(image, (down, right), axis=(1, 2))
     made[:, first:] = moved[:, first:]
@@ -91,8 +93,8 @@ _ATTACKS: tuple[tuple[str, str, str, float, Change], ...] = (
     ("RPCs in a town", "urban", "urban", 0.0, as_it_is),
     ("RPCs in a town", "suburban", "suburban", 10.0, as_it_is),
     ("RPCs, noise over a town", "-", "suburban", 0.0, noisy),
-    ("RPCs, a part lies off", "-", "rural", 0.0, partial(lower_part, 6.0, 20.0)),
-    ("RPCs, a part lies off", "far", "rural", 0.0, partial(lower_part, 20.0, 70.0)),
+    ("RPCs, a part lies off", "-", "rural", 0.0, lower_part),
+    ("RPCs, a part lies off", "far", "rural", 0.0, partial(lower_part, between_px=(20.0, 70.0))),
     ("RPCs, labels", "-", "suburban", 0.0, labelled),
 )
 
