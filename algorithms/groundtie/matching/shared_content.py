@@ -30,12 +30,15 @@ class ImageKinds:
         Of a radar and a camera image, whether the input is the radar's.
     open_ground
         Returns which pixels of a radar image are not open ground, of two that of the reference;
-        None: there is no radar image, or open ground is not asked for.
+        None: there is no radar image.
+    is_masked
+        Whether a mask leaves the ground, so that open ground is not surveyed by itself.
     """
 
     sensors: Sensors | None
     is_input_radar: bool = False
     open_ground: MaskOf | None = None
+    is_masked: bool = False
 
 
 @dataclass(frozen=True)

@@ -139,9 +139,11 @@ def survey_all(
         if rest is not None:  # else there is no map layer that the ground could lie beneath
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     last = context.part(0.9, 1.0)
-    if sensors is Sensors.RADARS and kinds.open_ground is not None:
-        ground = [survey_model(matcher, on_level, places, elsewhere_px, last, kinds.open_ground)]
-    elif sensors in (Sensors.CAMERAS, Sensors.DIFFERENT):
+    if sensors is Sensors.RADARS:
+        if kinds.open_ground is not None and not kinds.is_masked:
+            mask = kinds.open_ground
+            ground = [survey_model(matcher, on_level, places, elsewhere_px, last, mask)]
+    elif sensors is not None:
         ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, kinds, last)
     return Surveys(whole, rest, ground, unexplained=unexplained, far=far)
 

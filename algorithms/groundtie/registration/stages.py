@@ -137,11 +137,10 @@ class Stages:
         )
 
     def _kinds(self, model: Model) -> ImageKinds:
-        """Return what surveys need to know of the images; a ground mask needs no open ground."""
-        if self.spec.is_rendered:
-            return ImageKinds(None)
+        """Return what surveys need to know of the images."""
         kinds = self.masked.scene.kinds_by(model)
-        return kinds if self.masked.used.kind == NONE else replace(kinds, open_ground=None)
+        sensors = None if self.spec.is_rendered else kinds.sensors
+        return replace(kinds, sensors=sensors, is_masked=self.masked.used.kind != NONE)
 
     def evidence(self, estimate: Estimate, check: Check, surveys: Surveys) -> RegistrationEvidence:
         """Return the evidence for the rules."""

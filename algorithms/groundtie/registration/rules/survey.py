@@ -7,12 +7,7 @@ from dataclasses import replace
 
 from ...geometry.judging import RIVAL_HEIGHT
 from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
-from ...matching.parts import (
-    CANOPIES_PX,
-    CANOPIES_SHARE,
-    ELSEWHERE_PX,
-    LEAST_EXCESS,
-)
+from ...matching.parts import CANOPIES_PX, CANOPIES_SHARE, ELSEWHERE_PX, LEAST_EXCESS
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
