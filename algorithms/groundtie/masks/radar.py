@@ -18,8 +18,10 @@ SAMPLE_PX = 1024
 LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 
 
-# Backscatter in decibels, from the noise of a radar to corner reflectors.
-_LEAST_DB, _MOST_DB = -60.0, 40.0
+# Backscatter in decibels: from the noise of a radar to corner reflectors, and the least range of
+# the middle 98 % of the values. Real images have 8 dB and more between 10 and 90 % (suite
+# radar_likeness); standardised images have 4.7 between 1 and 99 %.
+_LEAST_DB, _MOST_DB, _LEAST_RANGE_DB = -60.0, 40.0, 10.0
 
 
 def variation2_of(image: Image) -> float:
@@ -35,8 +37,8 @@ def variation2_of(image: Image) -> float:
 def is_in_decibels(image: Image) -> bool:
     """Whether an image has the values of backscatter in decibels: many negative, none beyond.
 
-    Other images with as many negative values, such as standardised ones, mostly exceed that range,
-    or hardly vary if they are taken for decibels.
+    Other images with as many negative values, such as indices and standardised ones, have a larger
+    or a much smaller range.
     """
     return image.source.dtype.kind != "u" and _holds_decibels(_sample(image))
 
@@ -58,4 +60,7 @@ def _sample(image: Image) -> Patch:
 
 def _holds_decibels(patch: Patch) -> bool:
     known = patch.values[patch.valid]
-    return is_logarithmic(known) and known.min() >= _LEAST_DB and known.max() <= _MOST_DB
+    if not is_logarithmic(known) or known.min() < _LEAST_DB or known.max() > _MOST_DB:
+        return False
+    low, high = np.percentile(known, (1, 99))
+    return bool(high - low >= _LEAST_RANGE_DB)
