@@ -54,6 +54,11 @@ def test_a_run_prints_the_result_alone(capsys: pytest.CaptureFixture[str]) -> No
     assert Path("c.tif").read_bytes() == b"done"
 
 
+def test_a_tool_is_also_found_by_its_name_in_python(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["match_sar_sar", "--help"]) == 0
+    assert "Register a SAR image to another one" in capsys.readouterr().out
+
+
 def test_json_is_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
     options = "--search-radius 4 --mode work --no-careful --title words --tie-points t.gpkg"
     assert run(f"{GOOD} {options} --folder out --regions r.gpkg --seed 9 --json") == 0
@@ -369,7 +374,10 @@ def test_quiet_shows_no_progress_on_a_terminal() -> None:
         os.close(secondary)
         os.close(primary)
     assert shown["--quiet"] == "."
-    assert shown[""] == "\r 50% half of it\x1b[K\r100% half of it\x1b[K\r\x1b[K."
+    assert (
+        shown[""]
+        == "\r 50% half of it\x1b[K\r100% half of it\x1b[K\r100% half of it\x1b[K\r\x1b[K."
+    )
 
 
 def test_verbose_writes_the_log_and_no_progress(capsys: pytest.CaptureFixture[str]) -> None:

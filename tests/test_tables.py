@@ -88,6 +88,17 @@ def test_what_is_no_table_is_one_line(
     assert str(tmp_path / name) in caught.value.one_line()
 
 
+def test_a_table_in_another_encoding_says_which_is_needed(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_bytes("input\nMünchen.tif\n".encode("latin-1"))
+    with pytest.raises(ParameterError, match="save it as UTF-8"):
+        read_rows(tmp_path / "t.csv")
+
+
+def test_columns_may_be_in_capitals(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("INPUT,Max-Error\na.tif,2\n")
+    assert read_rows(tmp_path / "t.csv") == [{"input": "a.tif", "max_error": "2"}]
+
+
 def test_a_missing_table_is_named(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"none\.csv: No such file"):
         read_rows(tmp_path / "none.csv")

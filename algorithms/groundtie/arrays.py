@@ -34,6 +34,10 @@ _EVEN_PX = 0.05
 # Coordinates of all pixels, by which rioxarray locates an array that is rotated on its map.
 _ROTATED = ("xc", "yc")
 
+# Arrays of other programs have up to four colours last. A raster of so few columns cannot be
+# matched.
+_MOST_BANDS_LAST = 4
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Raster:
@@ -202,6 +206,8 @@ def in_memory(value: Any) -> Any:
         return value
     if isinstance(value, np.ndarray):
         return Raster(value)
+    if hasattr(value, "data_vars"):
+        raise ParameterError("a Dataset holds several arrays: give one of them, as dataset[name]")
     if hasattr(value, "dims") and hasattr(value, "coords"):
         return Raster.from_xarray(value)
     return None
@@ -212,6 +218,11 @@ def _pixels(values: Any) -> NDArray[Any]:
     if array.ndim not in (2, 3) or 0 in array.shape:
         raise ParameterError(
             f"an array must have the shape (h, w) or (bands, h, w), not {array.shape}"
+        )
+    if array.ndim == 3 and array.shape[2] <= _MOST_BANDS_LAST < array.shape[0]:
+        raise ParameterError(
+            f"an array has its bands first, and {array.shape} looks as if they were last: give "
+            "array.transpose(2, 0, 1)"
         )
     if array.dtype.kind not in "buifc":
         raise ParameterError(f"an array must hold numbers, not {array.dtype}")

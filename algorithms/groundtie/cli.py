@@ -203,8 +203,8 @@ class ToolGroup(click.Group):
         return list(self._names)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of a tool; None if there is no such tool."""
-        name = self._names.get(cmd_name)
+        """Return the command of a tool, by either spelling; None if there is no such tool."""
+        name = self._names.get(_command_name(cmd_name))
         return None if name is None else ToolCommand(load_tool(name))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import functools
 import inspect
 import operator
+import textwrap
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -216,14 +217,18 @@ def tool(
                     running(declared.run_of_call(values)),
                     bounded_cache() if rasters else nullcontext(),
                 ):
-                    return cast(Callable[..., R], function)(**values, **given, **through)
+                    result = cast(Callable[..., R], function)(**values, **given, **through)
             except MemoryError as error:
                 raise MemoryLimitError(f"memory does not suffice: {error}") from error
+            if through.get("progress") is not None:
+                through["progress"].finish()
+            return result
 
         declared = _declare(function, signature, checked, title, group, outputs)
         checked.__signature__ = signature.replace(  # type: ignore[attr-defined]
             parameters=[p for p in signature.parameters.values() if p.name != "parameters"]
         )
+        checked.__doc__ = _documented(inspect.getdoc(function) or "", declared.all_parameters)
         checked.__groundtie_tool__ = declared  # type: ignore[attr-defined]
         return checked
 
@@ -257,6 +262,19 @@ def _declare(
         run=run,
         common=tuple(p for p in parameters if p.kind.common),
     )
+
+
+def _documented(text: str, parameters: Iterable[Parameter]) -> str:
+    """Return a docstring with a section on parameters, for `help`."""
+    start, returns, end = text.partition("\nReturns\n")
+    lines = ["Parameters", "----------"]
+    for parameter in parameters:
+        form = parameter.kind.form
+        lines.append(f"{parameter.name} : {form}" if form else parameter.name)
+        lines += textwrap.wrap(
+            parameter.kind.help, 96, initial_indent=" " * 4, subsequent_indent=" " * 4
+        )
+    return "\n".join([start.rstrip(), "", *lines]) + (f"\n{returns}{end}" if returns else "\n")
 
 
 def _parameters(function: Callable[..., Any], signature: inspect.Signature) -> list[Parameter]:

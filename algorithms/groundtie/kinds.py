@@ -49,6 +49,11 @@ class Kind:
     optional_in_python: bool = False
     common: bool = False
 
+    @property
+    def form(self) -> str:
+        """Values in words, for the documentation of a function; empty: any that the help names."""
+        return ""
+
     def check(self, name: str, value: Any) -> Any:
         """Return `value` in the type that tools work with, or raise `ParameterError`."""
         raise NotImplementedError
@@ -208,6 +213,10 @@ class Number(Kind):
     maximum: float = math.inf
     integer: bool = False
 
+    @property
+    def form(self) -> str:
+        return ", ".join(filter(None, (self.unit, self.range_text)))
+
     def check(self, name: str, value: Any) -> float:
         try:
             if isinstance(value, bool):
@@ -249,6 +258,10 @@ class Choice(Kind):
     """One of several words; tools' names among them may have hyphens, as on the command line."""
 
     choices: tuple[str, ...]
+
+    @property
+    def form(self) -> str:
+        return ", ".join(self.choices)
 
     def check(self, name: str, value: Any) -> str:
         if isinstance(value, str) and value.replace("-", "_") in self.choices:

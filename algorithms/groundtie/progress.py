@@ -46,6 +46,10 @@ class Progress:
             _LOG.info(message)
         self.report(self.start + fraction * (self.end - self.start), message)
 
+    def finish(self) -> None:
+        """Report this part as done; it is too late to cancel."""
+        self.report(self.end, "")
+
     def over(self, items: Iterable[T], count: int) -> Iterator[T]:
         """Yield `count` items, and report each as done when the next one is asked for."""
         for number, item in enumerate(items, start=1):

@@ -118,7 +118,7 @@ def raster_of_item(name: Path | str) -> Path | str:
         return name  # a missing file is no item
     items, asset = read_items(name)
     if len(items) != 1:
-        raise ParameterError(f"{name} has {len(items)} items; one is needed")
+        raise ParameterError(f"{name} has {len(items)} STAC items; one is needed")
     return items[0].raster(asset)
 
 
@@ -141,8 +141,10 @@ def read_items(name: Path | str) -> tuple[list[StacItem], str | None]:
         raise ParameterError(f"{place} is no STAC item or item collection")
     try:
         return [_item(place, item) for item in items], asset
-    except (KeyError, TypeError, AttributeError) as error:
-        raise ParameterError(f"{place} is no STAC item: {error!r}") from error
+    except KeyError as error:
+        raise ParameterError(f"{place} is no STAC item: {error} is missing") from error
+    except (TypeError, AttributeError) as error:
+        raise ParameterError(f"{place} is no STAC item: {error}") from error
 
 
 def _item(place: Path | str, item: Mapping[str, Any]) -> StacItem:

@@ -28,6 +28,8 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     try:
         rows = _read_csv(path) if path.suffix.lower() == ".csv" else _read_nested(path)
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"the table {path} is no UTF-8 text: save it as UTF-8") from error
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise ParameterError(f"cannot read the table {path}: {reason}") from error
@@ -122,4 +124,4 @@ def _filled(row: dict[Any, Any]) -> dict[str, Any]:
 
 def _column(name: Any) -> str:
     """Return a parameter's name in Python by a column's name, as on the command line."""
-    return str(name).strip().lstrip("-").replace("-", "_")
+    return str(name).strip().lstrip("-").replace("-", "_").lower()

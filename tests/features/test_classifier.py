@@ -168,6 +168,9 @@ def test_no_json_is_refused(tmp_path: Path) -> None:
     (tmp_path / "c.json").write_text("once upon a time")
     with pytest.raises(ParameterError, match="is no feature classifier"):
         read_classifier(tmp_path / "c.json")
+    (tmp_path / "e.json").write_text('{"format": "of another program"}')
+    with pytest.raises(ParameterError, match="is missing"):
+        read_classifier(tmp_path / "e.json")
     (tmp_path / "l.json").write_text("[1, 2]")
     with pytest.raises(ParameterError, match="is no feature classifier"):
         read_classifier(tmp_path / "l.json")

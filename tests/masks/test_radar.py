@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
 from raster_files import write_raster
 
 from groundtie.masks.radar import (
     LEAST_VARIATION2,
     LEAST_VARIATION2_RATIO,
+    is_in_decibels,
     power,
     variation2_of,
 )
@@ -35,6 +37,26 @@ def test_speckle_varies_more_than_the_grain_of_a_camera(tmp_path: Path, looks: i
     assert (radar >= LEAST_VARIATION2) == (looks < 20)
     # Most homogeneous windows are so by chance, too.
     assert 0.3 < radar * looks < 1.2
+
+
+@pytest.mark.parametrize(("unit", "name"), [("dB", None), (None, "Sigma0_VV_db"), (None, None)])
+def test_positive_decibels_are_known_by_their_unit_or_name(
+    tmp_path: Path, unit: str | None, name: str | None
+) -> None:
+    random = np.random.default_rng(1)
+    amplitude = 50 * np.sqrt(random.gamma(1, 1, (200, 200)))
+    path = write_raster(tmp_path / "a.tif", (20 * np.log10(amplitude) + 60).astype(np.float32))
+    with rasterio.open(path, "r+") as dataset:
+        if unit is not None:
+            dataset.units = [unit]
+        if name is not None:
+            dataset.set_band_description(1, name)
+    with open_raster(path) as source:
+        image = Image(source)
+        is_stated = unit is not None or name is not None
+        assert is_in_decibels(image) == is_stated
+        # Of one look; the most homogeneous windows are so by chance, too.
+        assert (variation2_of(image) > 0.3) == is_stated
 
 
 def test_power_is_zero_where_invalid() -> None:

@@ -8,7 +8,7 @@ import rasterio
 from raster_files import utm_grid, write_raster
 from scipy.ndimage import distance_transform_edt
 
-from groundtie.errors import RasterContentError
+from groundtie.errors import ParameterError, RasterContentError
 from groundtie.masks.scene import Scene, write_mask
 from groundtie.masks.threshold import ThresholdMask
 from groundtie.rasters.atomic import Outputs
@@ -76,6 +76,15 @@ def test_an_image_without_data_is_refused(tmp_path: Path) -> None:
     scene = scene_of(tmp_path / "a.tif", np.zeros((40, 40), np.float32), nodata=0)
     with pytest.raises(RasterContentError, match="no valid pixels"):
         ThresholdMask.of(scene, 20)
+
+
+@pytest.mark.parametrize("low", [60, 90])
+def test_something_is_left_between_the_thresholds(
+    tmp_path: Path, image: np.ndarray, low: float
+) -> None:
+    scene = scene_of(tmp_path / "a.tif", image)
+    with pytest.raises(ParameterError, match="nothing is left"):
+        ThresholdMask.of(scene, 40, low)
 
 
 def test_a_written_mask_is_0_and_1_on_the_same_grid(tmp_path: Path, image: np.ndarray) -> None:

@@ -16,7 +16,7 @@ from raster_files import UTM, utm_grid, write_raster
 from rasterio.io import MemoryFile
 from rasterio.vrt import WarpedVRT
 
-from groundtie.arrays import Raster
+from groundtie.arrays import Raster, in_memory
 from groundtie.errors import (
     BandError,
     GeoreferencingError,
@@ -121,6 +121,19 @@ def test_reading_leaves_the_array_as_it_was() -> None:
     with open_raster(values) as source:
         source.read(source.window)
     np.testing.assert_array_equal(values, before)
+
+
+@pytest.mark.parametrize("colours", [3, 4])
+def test_colours_come_first(colours: int) -> None:
+    with pytest.raises(ParameterError, match=r"transpose\(2, 0, 1\)"):
+        Raster(np.zeros((40, 60, colours), np.uint8))
+    assert Raster(np.zeros((colours, 40, 60), np.uint8)).values.shape == (colours, 40, 60)
+
+
+def test_a_dataset_of_xarray_is_several_arrays() -> None:
+    dataset = SimpleNamespace(dims={"x": 3}, coords={}, data_vars={})
+    with pytest.raises(ParameterError, match="give one of them"):
+        in_memory(dataset)
 
 
 def test_messages_name_the_size() -> None:

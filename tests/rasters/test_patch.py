@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -29,6 +30,17 @@ def test_flat_is_what_holds_one_value_among_valid_pixels() -> None:
     spoiled = np.full((3, 3), 4, np.float32)
     spoiled[0, 0] = 9
     assert patch(spoiled == 4, spoiled).is_flat
+
+
+@pytest.mark.parametrize("value", [0.1, 200, 1000.3, -7e8])
+def test_an_interpolated_constant_is_flat_and_the_least_grey_value_of_16_bits_is_not(
+    value: float,
+) -> None:
+    constant = np.full((40, 40), value, np.float32)
+    moved = np.array([[1, 0, 0.37], [0, 1, 0.54]])
+    interpolated = cv2.warpAffine(constant, moved, (30, 30), flags=cv2.INTER_CUBIC)[5:, 5:]
+    assert patch(values=interpolated).is_flat
+    assert not patch(values=np.array([[65534, 65535]], np.float32)).is_flat
 
 
 @pytest.mark.parametrize("border", [0, 1, 2])

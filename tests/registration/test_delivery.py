@@ -46,7 +46,7 @@ def test_files_of_an_accepted_registration(
     files = files_in(tmp_path)
     files.write(registration, context)
     assert set(listing(tmp_path)) == {"p.csv", "t.json", "r.html", "r.json"}
-    points, transform = registration.tie_points, registration.accepted()
+    points, transform = registration.tie_points, registration.accepted_transform()
     assert points is not None
     np.testing.assert_array_equal(
         load_transform(tmp_path / "t.json")(points.reference_xy), transform(points.reference_xy)

@@ -75,7 +75,7 @@ def test_a_registration_has_a_transform_points_and_a_verdict(
     registration: Registration, textured: TexturedPair
 ) -> None:
     assert registration.verdict.accepted
-    points, transform = registration.tie_points, registration.accepted()
+    points, transform = registration.tie_points, registration.accepted_transform()
     assert points is not None
     assert error_px(transform, textured) < 0.3
     # Points of the fit first, then check points.
@@ -114,7 +114,7 @@ def test_images_that_are_placed_are_matched_from_there_alone(
         with open_pair(files.reference, files.input, asked, context) as pair:
             found = run(pair, asked, context)
         assert found.verdict.accepted == is_found
-        assert not is_found or error_px(found.accepted(), files) < 0.3
+        assert not is_found or error_px(found.accepted_transform(), files) < 0.3
         survey = None if found.evidence is None else found.evidence.surveys.whole
         assert (survey is None) == is_placed
 
@@ -442,7 +442,7 @@ def test_where_few_check_points_agree_the_exchanged_pair_must_show_the_same(
     with open_pair(pair.reference, pair.input, COREGISTER, context) as opened:
         found = run(opened, COREGISTER, context)
     assert found.verdict.accepted and found.evidence is not None
-    assert error_px(found.accepted(), pair) < 0.5
+    assert error_px(found.accepted_transform(), pair) < 0.5
     assert found.evidence.needs_second_confirmation == is_asked
     exchanged = found.evidence.exchanged
     assert (exchanged is not None) == is_asked

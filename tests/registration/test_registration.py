@@ -241,7 +241,7 @@ def test_a_refusal_is_one_line_with_what_to_try(registration: Registration) -> N
     assert summary["verdict"]["rule"] == "nothing in common"
     assert lost.transform is None and lost.tie_points is None
     with pytest.raises(AssertionError):
-        lost.accepted()
+        lost.accepted_transform()
 
 
 def test_a_refusal_names_what_was_tried(registration: Registration) -> None:
@@ -275,7 +275,7 @@ def test_left_as_a_context_manager_it_closes_its_rasters(textured: TexturedPair)
         assert closed == []
     assert closed == [True]
     # Computed results remain.
-    points, transform = found.tie_points, found.accepted()
+    points, transform = found.tie_points, found.accepted_transform()
     assert points is not None
     assert np.isfinite(transform(points.reference_xy)).all()
     assert found.lines() and found.verdict.accepted

@@ -201,7 +201,7 @@ def test_an_asset_must_be_named_where_there_are_several(tmp_path: Path) -> None:
         ("a.csv", "file,time\n,2020-01-01\n", "row 1: no file"),
         ("a.json", "[]", "is no STAC item"),
         ("a.json", "{", "cannot read the STAC file"),
-        ("a.json", '{"type": "Feature"}', "is no STAC item"),
+        ("a.json", '{"type": "Feature"}', "is no STAC item: 'assets' is missing"),
         ("a.json", '{"type": "FeatureCollection", "features": [1]}', "is no STAC item"),
     ],
 )

@@ -123,7 +123,9 @@ def read_classifier(path: Path) -> FeatureClassifier:
         return _from_json(read_json(path))
     except OSError as error:
         raise ParameterError(f"{path} cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, OverflowError) as error:
+    except KeyError as error:
+        raise ParameterError(f"{path} is no feature classifier: {error} is missing") from error
+    except (ValueError, TypeError, OverflowError) as error:
         raise ParameterError(f"{path} is no feature classifier: {error}") from error
 
 

@@ -89,7 +89,7 @@ def monomials(uv: FloatArray, degree: int) -> FloatArray:
     return np.column_stack(columns)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model(ABC):
     """Base of all models: a displacement that depends on the position in a frame.
 
@@ -157,7 +157,7 @@ class Model(ABC):
         return np.asarray(rise / (2 * np.abs(step).max()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolynomialModel(Model):
     """Translation to third-degree polynomial: the displacement is a polynomial of the position.
 
@@ -176,7 +176,7 @@ class PolynomialModel(Model):
         return monomials(uv, DEGREE[self.kind]) @ self.coefficients
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ThinPlateSpline(Model):
     """Thin-plate spline: an affine part and bending weights at control points ([Bookstein1989]).
 

@@ -27,7 +27,7 @@ NONE_HELD_OUT = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TiePoints(Rows):
     """A table of tie points, one row a point.
 

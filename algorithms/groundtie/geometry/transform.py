@@ -34,7 +34,7 @@ from .terrain_model import TerrainModel
 FORMAT = "groundtie-transform/1"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Transform:
     """Reference map position ↔ input pixel position, for any number of positions at a time.
 
@@ -201,6 +201,8 @@ def load_transform(path: str | Path) -> Transform:
     TransformFileError
         The file cannot be read or does not hold a transform.
     """
+    if not isinstance(path, (str, Path)):
+        raise TransformFileError(f"a transform is read from a file, not from {type(path).__name__}")
     try:
         return Transform.from_json(read_json(Path(path)), Path(path).parent)
     except TransformFileError as error:

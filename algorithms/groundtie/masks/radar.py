@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..rasters.pair import Image
-from ..rasters.patch import Patch, is_logarithmic, middle_window
+from ..rasters.patch import Patch, has_negative, middle_window
 from ..rasters.reading import FloatImage
 from ..speckle.statistics import homogeneous_variation2
 
@@ -16,7 +16,6 @@ SAMPLE_PX = 1024
 # image, and its least ratio to that of a camera image. Measured in pixels of a few metres: 0.09 to
 # 0.24, ratio 12 to 300; two radar images of one place: ratio 7 at most.
 LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
-
 
 # Backscatter in decibels: from the noise of a radar to corner reflectors, and the least range of
 # the middle 98 % of the values. Real images have 8 dB and more between 10 and 90 % (suite
@@ -30,16 +29,20 @@ def variation2_of(image: Image) -> float:
     Grey values are assumed to be amplitudes, or decibels.
     """
     patch = _sample(image)
-    amplitude = to_amplitude(patch) if _holds_decibels(patch) else patch
+    is_logarithmic = _states_decibels(image) or _holds_decibels(patch)
+    amplitude = to_amplitude(patch) if is_logarithmic else patch
     return homogeneous_variation2(power(amplitude), patch.valid)
 
 
 def is_in_decibels(image: Image) -> bool:
-    """Whether an image has the values of backscatter in decibels: many negative, none beyond.
+    """Whether an image has decibels: by a band's unit or name, else by its values.
 
-    Other images with as many negative values, such as indices and standardised ones, have a larger
-    or a much smaller range.
+    Many values of backscatter are negative, and none is beyond a range. Other images with as many
+    negative values, such as indices and standardised ones, have a larger or a much smaller range.
+    Decibels that are all positive cannot be told from grey values.
     """
+    if _states_decibels(image):
+        return True
     return image.source.dtype.kind != "u" and _holds_decibels(_sample(image))
 
 
@@ -58,9 +61,15 @@ def _sample(image: Image) -> Patch:
     return Patch(*image.source.read(middle, image.band))
 
 
+def _states_decibels(image: Image) -> bool:
+    source = image.source
+    numbers = source.image_bands if image.band is None else (image.band,)
+    return any(source.bands[number - 1].is_in_decibels for number in numbers)
+
+
 def _holds_decibels(patch: Patch) -> bool:
     known = patch.values[patch.valid]
-    if not is_logarithmic(known) or known.min() < _LEAST_DB or known.max() > _MOST_DB:
+    if not has_negative(known) or known.min() < _LEAST_DB or known.max() > _MOST_DB:
         return False
     low, high = np.percentile(known, (1, 99))
     return bool(high - low >= _LEAST_RANGE_DB)

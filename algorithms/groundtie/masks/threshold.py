@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RasterContentError
+from ..errors import ParameterError, RasterContentError
 from ..progress import SILENT, Progress
 from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection, block_means
@@ -53,9 +53,16 @@ class ThresholdMask:
 
         Raises
         ------
+        ParameterError
+            Nothing is left between the two percentages.
         RasterContentError
             No pixel of the scene is valid.
         """
+        if high_percent + low_percent >= 100:
+            raise ParameterError(
+                f"without the brightest {high_percent:g} % and the darkest {low_percent:g} %, "
+                "nothing is left"
+            )
         sample = scene.sample(BLOCK_PX, _MEANS, progress)
         if sample.size == 0:
             raise RasterContentError(f"{scene.like.path} has no valid pixels to make a mask of")

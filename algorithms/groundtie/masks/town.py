@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..rasters.patch import is_logarithmic
+from ..rasters.patch import has_negative
 from . import threshold
 from .scene import Scene
 
@@ -25,10 +25,10 @@ def share_of_strong_scatterers(scene: Scene) -> float:
     """Return the share of an image, 0 to 1, that is brighter than its median by more than 6 dB.
 
     Grey values are amplitudes; means over 4 × 4 pixels are compared with their median. The share is
-    0 for an image in decibels.
+    0 where many are negative, as in standardised images.
     """
     amplitude = scene.sample(threshold.BLOCK_PX, _MEANS)
-    if amplitude.size == 0 or is_logarithmic(amplitude):
+    if amplitude.size == 0 or has_negative(amplitude):
         return 0.0
     power = amplitude**2
     return float(np.mean(power > _STRONG * np.median(power)))

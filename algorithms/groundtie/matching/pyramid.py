@@ -13,7 +13,7 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.held_images import held_on_level
 from .chips import ChipMatcher
-from .coarse_shift import Candidate, coarse_candidates, level_factor
+from .coarse_shift import SAME_PLACE_PX, Candidate, coarse_candidates, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .pooled import PooledHistogramMatcher
 from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
@@ -25,7 +25,6 @@ _CERTAIN = -6.0
 # Repetitive scenes match at several places. A candidate nearly as high as the best is tried, and
 # is a rival if chips support it with at least half the evidence (log10).
 _RIVAL_EVIDENCE = 0.5
-_SAME_PLACE_PX = 5.0
 
 # Above this number of expected false alarms (log10), nothing was found. Local matches may still
 # succeed where large chips failed, and the verdict checks their result.
@@ -142,6 +141,6 @@ def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) 
         apart = level.map_to_pixel(other.model(centre)) - level.map_to_pixel(best.model(centre))
         distance_px = float(np.hypot(*apart[0]))
         evident = _alarms(other) < _RIVAL_EVIDENCE * _alarms(best)
-        if distance_px > _SAME_PLACE_PX and evident:
+        if distance_px > SAME_PLACE_PX and evident:
             distance = distance_px * level.pixel_size_m
             raise AmbiguousPlaceError(f"two places match about as well, {distance:.0f} m apart")

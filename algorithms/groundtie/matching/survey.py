@@ -79,8 +79,7 @@ class Survey:
     @property
     def is_unsupporting_chip(self) -> NDArray[np.bool_]:
         """Which chips hardly match where the model predicts them, shape (n,)."""
-        near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
-        return np.asarray(near.max(axis=1) < _SUPPORT)
+        return np.asarray(self._near.max(axis=1) < _SUPPORT)
 
     @property
     def confirming(self) -> int:
@@ -90,8 +89,7 @@ class Survey:
     @property
     def comparable(self) -> int:
         """Number of chips that overlap the input where predicted; others have surfaces of 0."""
-        near = self.surfaces[:, self._distance_px <= TOLERANCE_PX]
-        return int((near != 0).any(axis=1).sum())
+        return int((self._near != 0).any(axis=1).sum())
 
     @property
     def height(self) -> float:
@@ -135,6 +133,11 @@ class Survey:
         """
         total = np.minimum(self.surfaces, MOST_OF_ONE).sum(axis=0)
         return np.asarray(total / max(len(self.surfaces), 1))
+
+    @property
+    def _near(self) -> NDArray[np.float32]:
+        """Similarity of each chip where the model predicts it, shape (n, shifts)."""
+        return self.surfaces[:, self._distance_px <= TOLERANCE_PX]
 
     @property
     def _is_far(self) -> NDArray[np.bool_]:

@@ -45,8 +45,8 @@ class BandInfo:
 
     @property
     def is_in_decibels(self) -> bool:
-        """Whether the unit contains decibels."""
-        return self.unit is not None and _DECIBEL.search(self.unit) is not None
+        """Whether its unit or its name, as "Sigma0_VV_db", states decibels."""
+        return any(text and _DECIBEL.search(text) for text in (self.unit, self.description))
 
     @classmethod
     def all_of(cls, dataset: Any) -> tuple[BandInfo, ...]:

@@ -17,6 +17,9 @@ from .windows import FloatImage, Mask, Window
 # Areas of zeros with at least this side hold no data.
 _EMPTY_PX = 9
 
+# Interpolating or averaging a constant changes it by a few units in the last place.
+_ROUNDING = 8 * float(np.finfo(np.float32).eps)
+
 # A larger share of negative values is not due to resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
 
@@ -43,9 +46,12 @@ class Patch:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the valid pixels, if any, are all the same."""
+        """Whether the valid pixels, if any, are all the same, but for rounding."""
         values = self.values[self.valid]
-        return values.size == 0 or bool(values.min() == values.max())
+        if values.size == 0:
+            return True
+        low, high = float(values.min()), float(values.max())
+        return high - low <= _ROUNDING * max(abs(low), abs(high))
 
     @property
     def images(self) -> Iterator[Patch]:
@@ -114,8 +120,8 @@ def distance_to_masked(valid: Mask) -> FloatImage:
     return np.asarray(cv2.distanceTransform(valid.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
 
 
-def is_logarithmic(known: FloatImage) -> bool:
-    """Return whether valid grey values, of any shape, are in decibels: many are negative."""
+def has_negative(known: FloatImage) -> bool:
+    """Return whether so many valid grey values, of any shape, are negative as in decibels."""
     return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 

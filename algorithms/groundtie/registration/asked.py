@@ -74,7 +74,11 @@ def asked_surface(given: Mapping[str, Any], image: str) -> StatedSurface | None:
     words = split_views(given["views"])
     if model is None:
         if words[1] is not None or (words[0] is not None and not asked_rendering(given)):
-            raise ParameterError("views go with a surface model (surface_model)")
+            raise ParameterError(
+                "views go with a surface model (surface_model), or state that the reference holds "
+                f"heights: '{_TERRAIN} {SUN} azimuth=155', '{_TERRAIN} {RADAR}' or '{_SURFACE} "
+                f"{RADAR} azimuth=280 incidence=35'"
+            )
         return None
     names = ("reference", image)
     views = [View.of(given[name], word) for name, word in zip(names, words, strict=True)]

@@ -75,14 +75,14 @@ class RegistrationFiles:
             self.output.path,
             grid,
             report.parent,
-            quality_of(registration.verdict, registration.accepted()),
+            quality_of(registration.verdict, registration.accepted_transform()),
         )
 
     def _write_results(
         self, registration: Registration, outputs: Outputs, context: Context
     ) -> Grid | None:
         """Write an accepted registration's results, and return the registered raster's grid."""
-        transform, points = registration.accepted(), registration.tie_points
+        transform, points = registration.accepted_transform(), registration.tie_points
         evidence = registration.evidence
         assert points is not None and evidence is not None
         if self.tie_points is not None:

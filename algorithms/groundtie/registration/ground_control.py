@@ -59,7 +59,7 @@ class GroundControl:
     points: ControlPoints | None
     common: Common = NOTHING_COMMON
 
-    def accepted(self) -> ControlPoints:
+    def accepted_points(self) -> ControlPoints:
         """Return the points.
 
         Raises

@@ -86,7 +86,7 @@ class RefinementFiles:
         """
         if not found.registration.verdict.accepted and self.report is not None:
             replace(found.registration, parameters=self.parameters).report(self.report)
-        return found.accepted()
+        return found.accepted_points()
 
     def write(
         self,

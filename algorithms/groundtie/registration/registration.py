@@ -138,7 +138,7 @@ class Registration:
             return None
         return TiePoints.concatenate([self.evidence.estimate.points, self.evidence.check])
 
-    def accepted(self) -> Transform:
+    def accepted_transform(self) -> Transform:
         """Return the transform of an accepted registration."""
         assert self.verdict.accepted and self.transform is not None
         return self.transform
@@ -198,7 +198,7 @@ class Registration:
         threads_used = None if workers is None else int(_WORKERS.check("workers", workers))
         if path is None and grid == UNTOUCHED:
             raise ParameterError(f"the grid {UNTOUCHED} needs an output")
-        transform = self.accepted()
+        transform = self.accepted_transform()
         reference = self.pair.reference.source.grid
         with threads(threads_used) as context, ExitStack() as stack:
             source = self.pair.input.source
@@ -237,7 +237,9 @@ class Registration:
         """
         grid = _GRID.check("grid", grid)
         assert self.evidence is not None
-        return BeyondOverlap.of(grid, transform or self.accepted(), self.evidence.grid.covers)
+        return BeyondOverlap.of(
+            grid, transform or self.accepted_transform(), self.evidence.grid.covers
+        )
 
     def report(self, path: Path | str) -> None:
         """Write the report, an HTML page, and its numbers beside it as JSON.

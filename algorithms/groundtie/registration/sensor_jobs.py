@@ -87,7 +87,7 @@ def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpRes
     with threads(parameters["workers"], progress) as context, ExitStack() as stack:
         sensor, found = _matched(parameters, stack, context)
         assert found is not None
-        points = found.accepted()
+        points = found.accepted_points()
         with Outputs() as outputs:
             points.write(outputs.stage(output), sensor.orientation, sensor.source.grid)
     registration = found.registration

@@ -195,8 +195,7 @@ def _fit(
             # Polynomials bend along features that no rendering shows: land cover and layover.
             candidates = tuple(kind for kind in candidates if kind in (*LINEAR_CANDIDATES, TERRAIN))
         return SurfaceFit(matcher, layout, candidates, terrain=terrain)
-    is_masked = any(image.mask is not None for image in (pair.reference, pair.input))
-    shown = pair if is_masked else None
+    shown = pair if pair.is_masked else None
     chips = ChipMatcher(pair, SimilaritySettings(spec.refinement), held_out)
     # Detectors and descriptors were chosen among many by `detector_repeatability` and `make bench`
     # (see `studies`).

@@ -22,7 +22,7 @@ from ..masks.surface_model import SurfaceGround, write_image
 from ..masks.used import REFERENCE, SURFACE, MaskUsed
 from ..rasters.atomic import scratch_folder
 from ..rasters.pair import Image, ImagePair
-from ..rasters.patch import Patch, is_logarithmic, middle_window
+from ..rasters.patch import Patch, has_negative, middle_window
 from ..rasters.reading import FloatImage, Window, open_raster
 from .masks import Masked
 from .scene import SceneInfo, scene_of
@@ -202,7 +202,7 @@ def _level(patch: Patch) -> FloatImage:
     """Return the logarithm of an image's brightness, in any unit."""
     if not patch.valid.any():
         return np.zeros_like(patch.values)
-    if is_logarithmic(patch.values[patch.valid]):
+    if has_negative(patch.values[patch.valid]):
         return patch.values
     return np.log(np.maximum(patch.values, patch.values[patch.valid].mean() * _DARKEST))
 

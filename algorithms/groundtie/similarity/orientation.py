@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rasters.patch import Patch, is_logarithmic
+from ..rasters.patch import Patch, has_negative
 from .order_statistics import median, upper_median
 from .stacks import each, flat
 
@@ -49,7 +49,7 @@ def _compressed(values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArra
     known = values[valid]
     if known.size == 0:
         return np.zeros_like(values)
-    if is_logarithmic(known):
+    if has_negative(known):
         return np.where(valid, values, median(known))
     positive = known[known > 0]
     middle = median(positive) if positive.size else np.float32(1)

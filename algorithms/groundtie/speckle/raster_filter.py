@@ -126,7 +126,7 @@ def require_linear(source: RasterSource) -> None:
     for band in (source.bands[number - 1] for number in source.image_bands):
         if band.is_in_decibels:
             raise RasterContentError(
-                f"{name} is in decibels, by the unit that it states: make it linear before"
+                f"{name} is in decibels, by the unit or the name of its band: make it linear before"
             )
         if band.offset != 0:
             raise RasterContentError(

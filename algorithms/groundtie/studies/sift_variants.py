@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..features.descriptors import LENGTH, sift_rows
 from ..features.detectors import SiftDetector, SiftOctDetector
 from ..features.keypoints import Keypoints
-from ..rasters.patch import Patch, is_logarithmic
+from ..rasters.patch import Patch, has_negative
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
@@ -67,7 +67,7 @@ class SiftVariantDescriptor:
         """Return m keypoints, m ≥ n unless upright, and their descriptors, shape (m, 128)."""
         image = compress(window)
         if needs_positive(self.gradient):
-            is_decibel = is_logarithmic(window.values[window.valid])
+            is_decibel = has_negative(window.values[window.valid])
             image = np.exp(image * np.float32(_NEPER_PER_DB) if is_decibel else image)
         return self.describe_image(image, window.valid, found)
 
