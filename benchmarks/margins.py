@@ -27,6 +27,8 @@ from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     EVEN_PEAK_DEVIATIONS,
     LEAST_OF_REST,
+    LEAST_POSITIVE,
+    MOST_NEGATIVE,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
     WEAK_HEIGHT,
@@ -143,6 +145,12 @@ def _height_of_else(evidence: RegistrationEvidence) -> float:
     return height if math.isfinite(height) else math.nan
 
 
+def _opposite_signs(evidence: RegistrationEvidence) -> float:
+    """Return how many windows have opposite contrast for each that has the same; NaN: not asked."""
+    signs = evidence.surveys.signs
+    return math.nan if signs is None else signs.negative / max(signs.positive, LEAST_POSITIVE)
+
+
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
     Statistic("part elsewhere: excess far off", LEAST_EXCESS, _of_survey(_excess_far_off)),
@@ -175,6 +183,7 @@ STATISTICS = (
         REST_PEAK_DEVIATIONS,
         lambda evidence: deviations_of_unexplained(evidence.surveys),
     ),
+    Statistic("one sign of contrast: negative", MOST_NEGATIVE, _opposite_signs, False),
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),

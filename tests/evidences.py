@@ -18,6 +18,7 @@ from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.check import CHECK_RADIUS_PX
+from groundtie.matching.contrast_signs import ContrastSigns
 from groundtie.matching.parts import ELSEWHERE_PX, FarPlace
 from groundtie.matching.shared_content import Sensors, SharedContent
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
@@ -101,12 +102,13 @@ def evidence(
     rest: Rest | None = None,
     ground: Sequence[Survey] = (),
     unexplained: Survey | None = None,
+    signs: ContrastSigns | None = None,
     far: FarPlace | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, ground, unexplained=unexplained, far=far)
+    surveys = Surveys(survey, rest, ground, unexplained=unexplained, signs=signs, far=far)
     images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
     return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 

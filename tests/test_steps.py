@@ -216,7 +216,7 @@ class TestFit:
         ("asked", "message"),
         [
             ({"pixel_size": 0}, "pixel_size must be above 0, not 0"),
-            ({"pixel_size": -1}, "pixel_size must be at least 0, not -1"),
+            ({"pixel_size": -1}, "pixel_size must be above 0, not -1"),
             ({"pixel_size": "a"}, "pixel_size must be a number, not 'a'"),
             ({"tolerance_px": 0}, "tolerance_px must be above 0, not 0"),
             ({"tolerance_px": np.nan}, "tolerance_px must be a finite number, not nan"),

@@ -59,7 +59,7 @@ _RADIUS = Number(help="Largest shift.", unit="px", minimum=0, integer=True)
 # With a radius of 0, a surface has no peak inside.
 _MATCH_RADIUS = replace(_RADIUS, minimum=1)
 _REACH = replace(_RADIUS, integer=False)
-_SIZE = Number(help="Size, above 0.", minimum=0)
+_SIZE = Number(help="Size, above 0.")
 _SEED = Number(help="Seed of random numbers.", minimum=0, integer=True)
 _KIND = Choice(help="Kind of model.", choices=KINDS)
 _SIMILARITY = Choice(help="What is compared.", choices=SIMILARITIES)
@@ -341,8 +341,8 @@ def _require(name: str, value: Any, kind: type) -> None:
 
 def _above_0(name: str, value: Any) -> float:
     number = _SIZE.check(name, value)
-    if number == 0:
-        raise ParameterError(f"{name} must be above 0, not 0")
+    if number <= 0:
+        raise ParameterError(f"{name} must be above 0, not {number:g}")
     return number
 
 

@@ -48,6 +48,7 @@ from groundtie.errors import (
 from groundtie.geometry.estimation import Estimate
 from groundtie.masks.used import GROUND, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
+from groundtie.matching.contrast_signs import ContrastSigns
 from groundtie.matching.parts import FarPlace
 from groundtie.matching.shared_content import Sensors
 from groundtie.pose.pose import Pose, PoseFound
@@ -227,6 +228,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
     "unexplained elsewhere": (
         evidence(GOOD, survey=survey(), unexplained=survey(peak=6.1 / 7, peak_px=13)),
         evidence(GOOD, survey=survey(), unexplained=survey(peak=5.9 / 7, peak_px=13)),
+    ),
+    "one sign of contrast": (
+        evidence(GOOD, survey=survey(), signs=ContrastSigns(0.6, 0.05)),
+        evidence(GOOD, survey=survey(), signs=ContrastSigns(0.6, 0.07)),
     ),
     "rest elsewhere": (
         evidence(

@@ -125,6 +125,27 @@ def test_towns_are_where_strong_scatterers_stand(
     assert (info.is_town, info.may_be_town) == expected
 
 
+@pytest.mark.parametrize(
+    ("rough", "smooth", "is_known", "expected"),
+    [
+        # Speckle, or what a layer of half opacity leaves of it, beside a camera's noise.
+        (0.06, 0.006, False, True),
+        (0.013, 0.001, False, True),
+        (0.012, 0.001, False, False),
+        (0.02, 0.01, False, False),
+        (0.02, 0.01, True, True),
+    ],
+)
+def test_a_layer_may_hide_that_images_are_of_two_sensors(
+    rough: float, smooth: float, is_known: bool, expected: bool
+) -> None:
+    info = SceneInfo(facts(rough, is_known_radar=is_known), facts(smooth))
+    assert info.may_be_different == expected
+    assert replace(info, declared="reference").may_be_different
+    for declared in (BOTH, NEITHER):
+        assert not replace(info, declared=declared).may_be_different
+
+
 def test_a_users_mask_needs_no_speckle() -> None:
     town = facts(is_known_radar=True, strong_share=0.25)
     for has_mask in (False, True):

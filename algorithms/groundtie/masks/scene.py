@@ -63,7 +63,7 @@ class Scene:
         """All pixels of the grid."""
         return Window(0, 0, *self.grid.size)
 
-    def reduced(self, factor: int, progress: Progress = SILENT) -> Patch:
+    def reduced(self, factor: int, progress: Progress) -> Patch:
         """Return the whole scene as means over blocks of factor × factor pixels.
 
         Blocks at the right and lower border may be cut.

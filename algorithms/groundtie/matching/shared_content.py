@@ -33,12 +33,15 @@ class ImageKinds:
         None: there is no radar image.
     is_masked
         Whether a mask leaves the ground, so that open ground is not surveyed by itself.
+    may_be_different
+        Whether they may be a radar and a camera image, with a layer drawn over both.
     """
 
     sensors: Sensors | None
     is_input_radar: bool = False
     open_ground: MaskOf | None = None
     is_masked: bool = False
+    may_be_different: bool = False
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from ..similarity.local_contrast import without_bright, without_dark
 from ..similarity.surface import SimilaritySettings
 from .chip_windows import PartOf, Resampled
 from .chips import ChipMatcher
+from .contrast_signs import ContrastSigns, survey_signs
 from .far_places import FarSearch
 from .locked import find_locked_content
 from .matcher import MaskOf, Places
@@ -70,6 +71,8 @@ class Surveys:
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
         Of the part of the input that the reference does not explain; None: as `rest`.
+    signs
+        Signs of the contrast; None: the images are not a radar's and a camera's.
     far
         Where the whole pair matches best beyond the surveys' radius; None: it is not compared,
         because one image is rendered, only ground takes part, or a pose was searched for, which is
@@ -81,6 +84,7 @@ class Surveys:
     ground: Sequence[Survey] = ()
     fine: Survey | None = None
     unexplained: Survey | None = None
+    signs: ContrastSigns | None = None
     far: FarPlace | None = None
 
     @property
@@ -130,6 +134,7 @@ def survey_all(
     whole = survey_model(matcher, on_level, places, elsewhere_px, part)
     whole = search.with_far(whole, places.chip_px, kinds.open_ground)
     far = search.whole() if may_repeat else None
+    signs = survey_signs(on_level, places, context.quiet()) if kinds.may_be_different else None
     rest, unexplained = None, None
     ground: Sequence[Survey] = ()
     if sensors is not None:
@@ -145,7 +150,7 @@ def survey_all(
             ground = [survey_model(matcher, on_level, places, elsewhere_px, last, mask)]
     elif sensors is not None:
         ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, kinds, last)
-    return Surveys(whole, rest, ground, unexplained=unexplained, far=far)
+    return Surveys(whole, rest, ground, unexplained=unexplained, signs=signs, far=far)
 
 
 def _survey_even_ground(

@@ -286,7 +286,7 @@ def scratch_folder() -> Iterator[Path]:
         claim.close()
 
 
-def no_space(path: str | os.PathLike[str], needed: float | None = None) -> OutputError:
+def no_space(path: str | os.PathLike[str], needed: float | None) -> OutputError:
     """Return the error that a disk is full.
 
     Parameters

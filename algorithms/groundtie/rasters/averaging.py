@@ -25,7 +25,7 @@ MIN_VALID_SHARE = 0.5
 HELD_PIXELS = 2048**2
 
 
-def overlaps(edges: NDArray[np.float64], count: int, dtype: Any = np.float32) -> sparse.csr_matrix:
+def overlaps(edges: NDArray[np.float64], count: int, dtype: Any) -> sparse.csr_matrix:
     """Return the share of each of `count` pixels that lies in each interval.
 
     Parameters

@@ -113,9 +113,7 @@ class Image:
         return sorted({**self.tags, **made}.items())
 
 
-def base_image(
-    template: bytes, width: int, height: int, masked: bool, nodata: int | None = None
-) -> Image:
+def base_image(template: bytes, width: int, height: int, masked: bool, nodata: int | None) -> Image:
     """Return the image of a raster with the tags of a template, without blocks yet.
 
     Parameters

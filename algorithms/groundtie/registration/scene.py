@@ -36,6 +36,9 @@ from ..rasters.reading import Mask, Window
 from ..sensor.orientation import SensorGrid
 from .specification import BOTH, NEITHER
 
+# A layer of half opacity over a radar image halves the coefficient of variation of its speckle.
+_LEAST_BENEATH_LAYER = 1 / 4
+
 
 @dataclass(frozen=True)
 class ImageFacts:
@@ -207,6 +210,17 @@ class SceneInfo:
         return self.radar.variation2 >= LEAST_VARIATION2_RATIO * self.other.variation2
 
     @property
+    def may_be_different(self) -> bool:
+        """Whether they may be a radar and a camera image, unless a tool is for one kind.
+
+        A layer drawn over both reduces speckle, and the camera's noise alike.
+        """
+        if self.declared in (BOTH, NEITHER):
+            return False
+        is_rough = self.radar.variation2 >= _LEAST_BENEATH_LAYER * LEAST_VARIATION2
+        return self.apparent is Sensors.DIFFERENT or (is_rough and self._is_far_rougher)
+
+    @property
     def open_ground(self) -> OpenGround | None:
         """The open ground of the reference; None: the images are not two radars'."""
         return self.reference.open_ground if self.sensors is Sensors.RADARS else None
@@ -214,7 +228,12 @@ class SceneInfo:
     def kinds_by(self, model: Model) -> ImageKinds:
         """Return what surveys of a model on the map need to know of the images."""
         is_input_radar = self.sensors is Sensors.DIFFERENT and self.radar_name == INPUT
-        return ImageKinds(self.sensors, is_input_radar, self._open_ground_by(model))
+        return ImageKinds(
+            self.sensors,
+            is_input_radar,
+            self._open_ground_by(model),
+            may_be_different=self.may_be_different,
+        )
 
     def _open_ground_by(self, model: Model) -> MaskOf | None:
         """Return a mask of what is not open ground in a radar image; None: there is none.

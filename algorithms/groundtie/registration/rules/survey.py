@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from ...geometry.judging import RIVAL_HEIGHT
+from ...matching.contrast_signs import ContrastSigns
 from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
 from ...matching.parts import CANOPIES_PX, CANOPIES_SHARE, ELSEWHERE_PX, LEAST_EXCESS
 from ...matching.shared_content import Sensors
@@ -56,6 +57,13 @@ EVEN_PEAK_DEVIATIONS = 8.0
 _ROOFS_PX = 12.0
 
 
+# Share of windows in which grey values correlate positively, and the most that correlate negatively
+# relative to these. Correct transforms of radar and camera images: up to 0.6 positive, and 0.17
+# times as many negative or more (fields of another simulator; 0.3 in suite real). Half-transparent
+# layers: from 0.5 on, mostly without any negative (once_wrong.txt).
+LEAST_POSITIVE, MOST_NEGATIVE = 0.4, 0.1
+
+
 def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
     parts = evidence.surveys.parts
     if not parts:
@@ -82,6 +90,22 @@ def _second_place_far_off(evidence: RegistrationEvidence) -> str | None:
     if far is None or far.height < LEAST_HEIGHT or not far.is_rival:
         return None
     return f"the images match about as well {far.distance_px:.0f} px off as a whole"
+
+
+def _one_sign(evidence: RegistrationEvidence) -> str | None:
+    signs = evidence.surveys.signs
+    if signs is None or not has_one_sign(signs):
+        return None
+    return (
+        f"bright and dark areas coincide in {signs.positive:.0%} of windows and are opposite in "
+        f"{signs.negative:.0%}, as of one layer drawn over a radar and a camera image"
+    )
+
+
+def has_one_sign(signs: ContrastSigns) -> bool:
+    """Whether the contrast has the same sign nearly everywhere, as in no two sensors' images."""
+    is_frequent = signs.positive >= LEAST_POSITIVE
+    return is_frequent and signs.negative <= MOST_NEGATIVE * signs.positive
 
 
 def _has_rival(survey: Survey) -> bool:
@@ -286,6 +310,19 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "[Kuglin1975]; suites margins, one_grid and attacks",
         WITHOUT,
         _unexplained_elsewhere,
+        is_final=True,
+    ),
+    Rule(
+        "one sign of contrast",
+        "between a radar and a camera image, grey values of blocks of 4 × 4 px correlate "
+        f"positively in {LEAST_POSITIVE:.0%} of chips or more, and negatively in less than "
+        f"{MOST_NEGATIVE:g} times as many, as in a layer that is drawn over both. Asked if the "
+        "images are such by metadata or speckle, also if a layer has halved its coefficient of "
+        "variation; not of images that a tool takes for one kind",
+        "suites real and attacks",
+        f"{WITHOUT}; if both images are a radar's, use match_sar_sar, if both are a camera's, "
+        "match_optical",
+        _one_sign,
         is_final=True,
     ),
     Rule(
