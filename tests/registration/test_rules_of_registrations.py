@@ -35,6 +35,7 @@ from scipy.stats import binom
 
 from groundtie.masks.used import GROUND, LAYER, NONE, REFERENCE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
+from groundtie.matching.contrast_signs import ContrastSigns
 from groundtie.matching.parts import LEAST_EXCESS, Part
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
@@ -125,6 +126,16 @@ def test_images_that_vary_as_one_sensors_are_no_radars(alike: float, expected: l
     sameness = replace(DRAWN_OVER, area=0.1, reduced_area=alike, coarse_area=alike)
     found = evidence(two_thirds(20), scene=PERHAPS, rest=leaving(sameness=sameness))
     assert refusing(found) == expected
+
+
+@pytest.mark.parametrize(("off_drawn", "is_refused"), [(0.9, True), (1.1, False)])
+def test_contrast_of_one_sign_is_suspected_where_layers_lie(
+    off_drawn: float, is_refused: bool
+) -> None:
+    rest = in_common(Sensors.DIFFERENT, survey())
+    rest = replace(rest, shared=replace(rest.shared, off_drawn=off_drawn))
+    found = evidence(GOOD, survey=survey(), rest=rest, signs=ContrastSigns(0.6, 0.0))
+    assert ("one sign of contrast" in refusing(found)) == is_refused
 
 
 def test_an_image_of_fields_is_not_suspected() -> None:

@@ -93,8 +93,8 @@ def _second_place_far_off(evidence: RegistrationEvidence) -> str | None:
 
 
 def _one_sign(evidence: RegistrationEvidence) -> str | None:
-    signs = evidence.surveys.signs
-    if signs is None or not has_one_sign(signs):
+    signs, rest = evidence.surveys.signs, evidence.surveys.rest
+    if signs is None or not has_one_sign(signs) or (rest and rest.shared.moves_as_ground):
         return None
     return (
         f"bright and dark areas coincide in {signs.positive:.0%} of windows and are opposite in "
@@ -318,7 +318,9 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"positively in {LEAST_POSITIVE:.0%} of chips or more, and negatively in less than "
         f"{MOST_NEGATIVE:g} times as many, as in a layer that is drawn over both. Asked if the "
         "images are such by metadata or speckle, also if a layer has halved its coefficient of "
-        "variation; not of images that a tool takes for one kind",
+        f"variation, and displaced as layers are: up to {NOMINAL_PX:g} px on the map, or up to "
+        f"{WHOLE_TIMES_EXACT * EXACT_PX:g} px off whole pixels. Not of images that a tool takes "
+        "for one kind",
         "suites real and attacks",
         f"{WITHOUT}; if both images are a radar's, use match_sar_sar, if both are a camera's, "
         "match_optical",
