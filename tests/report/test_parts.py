@@ -35,8 +35,18 @@ def test_numbers_of_a_part() -> None:
 
 def test_chips_that_fell_anywhere_are_no_part() -> None:
     anywhere = survey(30)
-    assert parts.shown(anywhere) is None
+    assert parts.shown(anywhere)["rows"] == []
     assert parts.summary(anywhere) == []
+
+
+def test_coverage_names_where_most_hardly_matches() -> None:
+    # Chips of the two upper rows do not match where the others do.
+    assert parts.counts(TWO_ROWS) == {"chips": 49, "confirming": 35, "hardly_matching": 14}
+    assert parts.coverage(TWO_ROWS) == (
+        "35 of 49 chips confirm the transform, 14 hardly match, 14 of them side by side "
+        "around the upper"
+    )
+    assert parts.coverage(survey(49)) == "49 of 49 chips confirm the transform, 0 hardly match"
 
 
 def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
@@ -49,6 +59,15 @@ def test_the_map_has_an_arrow_for_every_chip_of_a_part_in_its_colour() -> None:
     confirming = [line for line in axes.lines if line.get_color() == FIT_COLOUR]
     assert [len(line.get_xdata()) for line in confirming] == [35]
     assert [len(line.get_xdata()) for line in axes.lines if line.get_color() == COLOURS[0]] == [14]
+
+
+def test_without_parts_the_map_has_no_arrows() -> None:
+    axes = parts_map(survey(49)).axes[0]
+    assert not any(isinstance(c, Quiver) for c in axes.collections)
+    shown = {
+        line.get_color(): len(line.get_xdata()) for line in axes.lines if len(line.get_xdata())
+    }
+    assert shown == {FIT_COLOUR: 49}
 
 
 @pytest.mark.slow

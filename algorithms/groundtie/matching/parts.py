@@ -28,7 +28,7 @@ from .belief_propagation import Surfaces
 ELSEWHERE_PX, CANOPIES_PX, CANOPIES_SHARE = 2 * TOLERANCE_PX, 20.0, 1 / 8
 
 # Fewest chips of a part, and the largest similarity that one chip may contribute.
-_FEWEST_CHIPS = 3
+FEWEST_CHIPS = 3
 MOST_OF_ONE = 7.0
 
 # The highest chip of a part determines its shift, and the others confirm it. The excess is how much
@@ -99,7 +99,7 @@ class Part:
         excess: float,
     ) -> Part:
         """Return the part of some members of a survey's chips, whose centres are given."""
-        where = _where(grid, centres[members].mean(axis=0))
+        where = place_in_words(grid, centres[members].mean(axis=0))
         return cls(where, shift_px, excess, tuple(map(int, members)))
 
     @property
@@ -143,7 +143,8 @@ def find_parts(
 
 def largest_group(centres: NDArray[np.int_], which: NDArray[np.bool_]) -> NDArray[np.int_]:
     """Return the numbers of the largest group of neighbours among some chips, shape (n,)."""
-    return max(_connected(np.flatnonzero(which), _are_neighbours(centres)), key=len)
+    groups = _connected(np.flatnonzero(which), _are_neighbours(centres))
+    return max(groups, key=len, default=np.zeros(0, int))
 
 
 def _highest_group(
@@ -154,7 +155,7 @@ def _highest_group(
     At a shift, the best set of a given size consists of the highest chips, so no more sets need be
     tried than there are chips [Neill2012]. Each group of neighbours in the best set may be a part.
     """
-    if len(which) < _FEWEST_CHIPS:
+    if len(which) < FEWEST_CHIPS:
         return None
     sizes, excesses = _highest_sets(higher[which])
     best = None
@@ -163,7 +164,7 @@ def _highest_group(
             break  # no group has a larger excess than the set that contains it
         highest = which[np.argsort(-higher[which, place])[: sizes[place]]]
         for group in _connected(highest, are_neighbours):
-            if len(group) >= _FEWEST_CHIPS and _excess(higher[group, place]) >= least:
+            if len(group) >= FEWEST_CHIPS and _excess(higher[group, place]) >= least:
                 least = _excess(higher[group, place])
                 best = np.sort(group), place, least
     return best
@@ -184,8 +185,8 @@ def _highest_sets(higher: FloatArray) -> tuple[NDArray[np.int_], FloatArray]:
     """Return for each shift the size and excess of the set of highest chips with most excess."""
     confirming = np.sort(higher, axis=0)[-2::-1].cumsum(axis=0)
     excess = confirming / np.sqrt(np.arange(1, len(higher)))[:, None]
-    excess = excess[_FEWEST_CHIPS - 2 :]
-    return excess.argmax(axis=0) + _FEWEST_CHIPS, excess.max(axis=0)
+    excess = excess[FEWEST_CHIPS - 2 :]
+    return excess.argmax(axis=0) + FEWEST_CHIPS, excess.max(axis=0)
 
 
 def _excess(higher: FloatArray) -> float:
@@ -216,7 +217,7 @@ def _limited(surfaces: Surfaces) -> Surfaces:
     return np.asarray(surfaces * (MOST_OF_ONE / highest))
 
 
-def _where(grid: Grid, px: FloatArray) -> str:
+def place_in_words(grid: Grid, px: FloatArray) -> str:
     """Return the name of the thirds of a grid, along both axes, that hold a position (col, row)."""
     col, row = (min(int(3 * at / side), 2) for at, side in zip(px, grid.size, strict=True))
     return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"

@@ -31,6 +31,7 @@ from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.warping import METHODS
 from ..report.correction import Correction
 from ..report.details import extremes
+from ..report.parts import coverage
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
@@ -309,6 +310,7 @@ class Registration:
                 v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
+                *self._coverage(),
             ]
             lines += self.pair.notes()
             if self.mask.image is not None:
@@ -316,6 +318,11 @@ class Registration:
             if self.beyond is not None:
                 lines.append(self.beyond.line())
         return lines + file_lines(self.files)
+
+    def _coverage(self) -> list[str]:
+        """Return how much of the scene confirms the transform, a line of text if surveyed."""
+        survey = None if self.evidence is None else self.evidence.surveys.whole
+        return [] if survey is None else [f"all over the overlap: {coverage(survey)}"]
 
     def __repr__(self) -> str:
         # The default would show all fields, which hold arrays and open rasters.

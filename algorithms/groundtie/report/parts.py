@@ -1,4 +1,4 @@
-"""The parts of a scene that its transform misplaces, in words and as a map."""
+"""What confirms a transform all over a scene, and parts that it misplaces: in words, as a map."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..matching.survey import Part, Survey
+from ..matching.parts import FEWEST_CHIPS, Part, largest_group, place_in_words
+from ..matching.survey import Survey
 from . import figures
 from .correction import move_in_words
 
@@ -37,17 +38,37 @@ def lines(survey: Survey) -> list[str]:
     return [_in_words(part, survey) for part in survey.parts]
 
 
-def shown(survey: Survey) -> dict[str, Any] | None:
-    """Return the template's values for the parts; None: there are none."""
+def counts(survey: Survey) -> dict[str, int]:
+    """Return the numbers of chips, of those that confirm, and of those that hardly match."""
+    return {
+        "chips": len(survey.centres),
+        "confirming": survey.confirming,
+        "hardly_matching": int(survey.is_unsupporting_chip.sum()),
+    }
+
+
+def coverage(survey: Survey) -> str:
+    """Return in words how much of a scene confirms the transform, and where most does not."""
+    count = counts(survey)
+    line = (
+        f"{count['confirming']} of {count['chips']} chips confirm the transform, "
+        f"{count['hardly_matching']} hardly match"
+    )
+    group = largest_group(survey.centres, survey.is_unsupporting_chip)
+    if len(group) < FEWEST_CHIPS:
+        return line
+    where = place_in_words(survey.grid, survey.centres[group].mean(axis=0))
+    return f"{line}, {len(group)} of them side by side around the {where}"
+
+
+def shown(survey: Survey) -> dict[str, Any]:
+    """Return the template's values for the chips and the parts, if there are any."""
     parts = survey.parts
-    if not parts:
-        return None
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(parts))]
     return {
         "map": figures.svg_uri(parts_map(survey)),
         "rows": list(zip(colours, lines(survey), parts, strict=True)),
-        "chips": len(survey.centres),
-        "confirming": survey.confirming,
+        "coverage": coverage(survey),
     }
 
 
@@ -60,14 +81,18 @@ def parts_map(survey: Survey) -> Figure:
     for part in parts:
         other[list(part.members)] = False
     px = survey.centres.astype(float)
+    axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
+    hardly = other & survey.is_unsupporting_chip
+    axes.plot(*px[hardly].T, "o", color=figures.REJECTED_COLOUR, mfc="none", ms=6)
+    axes.plot(*px[other & ~hardly].T, "x", color=figures.REJECTED_COLOUR, ms=6)
+    if not parts:
+        return axes.figure
     farthest_px = max(part.distance_px for part in parts)
     # Chips of a part share its shift; the match of a single one may be farther than it reaches.
     shifts_px = survey.shifts_px.copy()
     for part in parts:
         shifts_px[list(part.members)] = part.shift_px
     arrows = figures.scaled_arrows(shifts_px, farthest_px, 0.1, grid)
-    axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
-    axes.plot(*px[other].T, "x", color=figures.REJECTED_COLOUR, ms=6)
     for k, part in enumerate(parts):
         members, colour = np.array(part.members, int), COLOURS[k % len(COLOURS)]
         axes.plot(*px[members].T, "o", color=colour, ms=8)

@@ -41,7 +41,7 @@ class Report(Page):
             "mask": found.mask.summary(),
             "notes": found.pair.notes(),
             "scene": found.scene.summary(),
-            **({} if survey is None else {"parts": parts.summary(survey)}),
+            **({} if survey is None else _survey_numbers(survey)),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
             **({"tried": list(found.tried)} if found.tried else {}),
         }
@@ -98,6 +98,10 @@ class Report(Page):
                 "beyond": int((errors.length_px[errors.check] > reach).sum()),
             }
         return shown
+
+
+def _survey_numbers(survey: Survey) -> dict[str, Any]:
+    return {"survey": parts.counts(survey), "parts": parts.summary(survey)}
 
 
 def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
