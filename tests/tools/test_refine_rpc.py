@@ -222,6 +222,7 @@ def test_given_points_recover_a_bias(tmp_path: Path, kind: str) -> None:
     summary = result.summary()
     assert summary["verdict"]["held_out"] == "points left out in turn"
     assert summary["bias"]["model"] == kind
+    assert "survey" not in summary  # nothing was matched
 
 
 def test_an_image_is_copied_with_its_refined_tags(tmp_path: Path) -> None:

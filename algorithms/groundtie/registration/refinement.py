@@ -18,7 +18,9 @@ from ..geometry.judging import FEWEST_CHECK_POINTS, TOLERANCE_PX
 from ..geometry.misses import Misses
 from ..kinds import plain
 from ..masks.used import MaskUsed
+from ..matching.survey import Survey
 from ..rasters.grid import PIXEL_COORDINATES, FloatArray, Grid
+from ..report.parts import coverage_lines, coverage_numbers
 from ..sensor.adjustment import Adjustment, Control, adjust, reach_px
 from ..sensor.bias import SHIFT, fold
 from ..sensor.control_points import ControlPoints, left_out
@@ -169,6 +171,8 @@ class RefinedRpc:
         The check of the heights' vertical datum.
     mask
         Which mask points were matched with; None: they were given.
+    survey
+        The survey of the matching by chips all over the overlap; None: there was none.
     files
         The files that were written, by name.
     tried
@@ -184,6 +188,7 @@ class RefinedRpc:
     verdict: Verdict
     heights: HeightCheck
     mask: MaskUsed | None
+    survey: Survey | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
 
@@ -242,10 +247,19 @@ class RefinedRpc:
         kept = points.reject(blunders, "blunder")
         above = _median_above(kept, image.orientation.heights) if found is None else None
         heights = check_heights(image.orientation, control.size, above)
-        mask = None if found is None else found.registration.mask
-        own, ground = image.source.grid.on_own_pixels(), image.heights
-        verdict = judge(evidence)
-        return cls(image.source.path, own, ground, kept, fit, evidence, verdict, heights, mask)
+        matched = None if found is None else found.registration
+        return cls(
+            image.source.path,
+            image.source.grid.on_own_pixels(),
+            image.heights,
+            kept,
+            fit,
+            evidence,
+            judge(evidence),
+            heights,
+            None if matched is None else matched.mask,
+            None if matched is None else matched.survey,
+        )
 
     @property
     def adjustment(self) -> Adjustment:
@@ -282,6 +296,7 @@ class RefinedRpc:
             "folding_residual_px": self.fit.largest_residual_px,
             "heights": {"used": self.ground, **self.heights.summary()},
             "mask": None if self.mask is None else self.mask.summary(),
+            **coverage_numbers(self.survey),
             "files": self.files,
             **({"tried": list(self.tried)} if self.tried else {}),
         }
@@ -302,6 +317,7 @@ class RefinedRpc:
             f"{evidence.after.rmse:.2f} px after",
             verdict.accuracy_line(),
             f"{verdict.check_points_agreeing} of {verdict.check_points} agree",
+            *coverage_lines(self.survey),
             *([f"set by hand: {by_hand} points"] if by_hand else []),
             *([left_out(lost)] if lost else []),
             self.ground,

@@ -22,6 +22,7 @@ from ..geometry.transform import Transform
 from ..kinds import GEOTIFF, Choice, FileOut, Number, RasterIn, RasterOut, WrittenKind
 from ..masks.used import MaskUsed
 from ..matching.check import Check
+from ..matching.survey import Survey
 from ..raster_names import file_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
@@ -31,7 +32,7 @@ from ..rasters.vrt import SUFFIX as VRT
 from ..rasters.warping import METHODS
 from ..report.correction import Correction
 from ..report.details import extremes
-from ..report.parts import coverage
+from ..report.parts import coverage_lines
 from ..report.report import Report
 from ..similarity.surface import Surface
 from .evidence import RegistrationEvidence
@@ -138,6 +139,11 @@ class Registration:
         if self.evidence is None:
             return None
         return TiePoints.concatenate([self.evidence.estimate.points, self.evidence.check])
+
+    @property
+    def survey(self) -> Survey | None:
+        """The survey by chips all over the overlap; None: there was none."""
+        return None if self.evidence is None else self.evidence.surveys.whole
 
     def accepted_transform(self) -> Transform:
         """Return the transform of an accepted registration."""
@@ -310,7 +316,7 @@ class Registration:
                 v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
-                *self._coverage(),
+                *coverage_lines(self.survey),
             ]
             lines += self.pair.notes()
             if self.mask.image is not None:
@@ -318,11 +324,6 @@ class Registration:
             if self.beyond is not None:
                 lines.append(self.beyond.line())
         return lines + file_lines(self.files)
-
-    def _coverage(self) -> list[str]:
-        """Return how much of the scene confirms the transform, a line of text if surveyed."""
-        survey = None if self.evidence is None else self.evidence.surveys.whole
-        return [] if survey is None else [f"all over the overlap: {coverage(survey)}"]
 
     def __repr__(self) -> str:
         # The default would show all fields, which hold arrays and open rasters.

@@ -11,9 +11,11 @@ from typing import Any
 from ..context import Context, threads
 from ..errors import ParameterError
 from ..masks.used import MaskUsed
+from ..matching.survey import Survey
 from ..progress import Progress
 from ..rasters.atomic import Outputs
 from ..rasters.reading import open_raster
+from ..report.parts import coverage_lines, coverage_numbers
 from ..sensor.control_points import ControlPoints, read_control_points
 from ..sensor.heights import require_crs
 from .asked import asked_masks, searched
@@ -41,6 +43,8 @@ class GcpResult:
         The file.
     heights
         Which heights were used, in words.
+    survey
+        The survey by chips all over the overlap; None: there was none.
     """
 
     points: ControlPoints
@@ -48,6 +52,7 @@ class GcpResult:
     mask: MaskUsed
     output: Path
     heights: str
+    survey: Survey | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""
@@ -58,6 +63,7 @@ class GcpResult:
             "heights": self.heights,
             "mask": self.mask.summary(),
             "verdict": self.verdict.summary(),
+            **coverage_numbers(self.survey),
         }
 
     def lines(self) -> list[str]:
@@ -69,6 +75,7 @@ class GcpResult:
             f"{int(points.fit.sum())} of {int((~points.is_check).sum())} "
             f"points, and {int(points.check.sum())} check points",
             f"error at check points: RMSE {error}",
+            *coverage_lines(self.survey),
             self.heights,
             self.mask.line(),
             f"wrote {self.output}",
@@ -91,7 +98,14 @@ def extract_control(parameters: Mapping[str, Any], progress: Progress) -> GcpRes
         with Outputs() as outputs:
             points.write(outputs.stage(output), sensor.orientation, sensor.source.grid)
     registration = found.registration
-    return GcpResult(points, registration.verdict, registration.mask, output, sensor.heights)
+    return GcpResult(
+        points,
+        registration.verdict,
+        registration.mask,
+        output,
+        sensor.heights,
+        registration.survey,
+    )
 
 
 def refine(

@@ -61,6 +61,16 @@ def coverage(survey: Survey) -> str:
     return f"{line}, {len(group)} of them side by side around the {where}"
 
 
+def coverage_numbers(survey: Survey | None) -> dict[str, Any]:
+    """Return `counts` as an entry of a result's summary; none without a survey."""
+    return {} if survey is None else {"survey": counts(survey)}
+
+
+def coverage_lines(survey: Survey | None) -> list[str]:
+    """Return `coverage` as the line of a result; none without a survey."""
+    return [] if survey is None else [f"all over the overlap: {coverage(survey)}"]
+
+
 def shown(survey: Survey) -> dict[str, Any]:
     """Return the template's values for the chips and the parts, if there are any."""
     parts = survey.parts

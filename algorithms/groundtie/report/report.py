@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..assessment.comparison import Comparison, without_masks
 from ..assessment.point_errors import PointErrors
-from ..matching.survey import Survey
 from ..similarity.peak import find_peak
 from ..similarity.surface import Surface
 from . import details, figures, parts, pictures
@@ -32,7 +31,7 @@ class Report(Page):
 
     def numbers(self) -> dict[str, Any]:
         """Return the measured values by name."""
-        found, survey = self.registration, self._survey
+        found, survey = self.registration, self.registration.survey
         correction, transform, beyond = found.correction, found.transform, found.beyond
         return {
             "verdict": found.verdict.summary(),
@@ -41,14 +40,15 @@ class Report(Page):
             "mask": found.mask.summary(),
             "notes": found.pair.notes(),
             "scene": found.scene.summary(),
-            **({} if survey is None else _survey_numbers(survey)),
+            **parts.coverage_numbers(survey),
+            **({} if survey is None else {"parts": parts.summary(survey)}),
             **({} if beyond is None else {"outside_of_overlap": beyond.summary()}),
             **({"tried": list(found.tried)} if found.tried else {}),
         }
 
     def values(self) -> dict[str, Any]:
         """Return the values that the template shows."""
-        found, pair, survey = self.registration, self.registration.pair, self._survey
+        found, pair, survey = self.registration, self.registration.pair, self.registration.survey
         beyond = () if found.beyond is None else (found.beyond.line(),)
         return {
             "verdict": found.verdict,
@@ -64,12 +64,6 @@ class Report(Page):
             "parts": None if survey is None else parts.shown(survey),
             **self._at_points(),
         }
-
-    @property
-    def _survey(self) -> Survey | None:
-        """The survey by chips all over the overlap; None: there was none."""
-        evidence = self.registration.evidence
-        return None if evidence is None else evidence.surveys.whole
 
     def _at_points(self) -> dict[str, Any]:
         """Return residuals, and chips at full resolution; nothing without a transform."""
@@ -98,10 +92,6 @@ class Report(Page):
                 "beyond": int((errors.length_px[errors.check] > reach).sum()),
             }
         return shown
-
-
-def _survey_numbers(survey: Survey) -> dict[str, Any]:
-    return {"survey": parts.counts(survey), "parts": parts.summary(survey)}
 
 
 def _shown_surface(label: str, surface: Surface) -> dict[str, Any]:
