@@ -21,7 +21,6 @@ from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import NONE, MaskUsed
 from groundtie.matching.survey import Survey
-from groundtie.matching.surveys import Surveys
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.rasters.pair import Image, ImagePair, make_pair
@@ -183,7 +182,7 @@ def registration_of(
         correction=None if transform is None else Correction.of(transform, pair.grid),
         extreme_surfaces=lambda: surfaces,
         scene=SimpleNamespace(facts=lambda: scene, summary=lambda: {"sensors": "cameras"}),
-        evidence=SimpleNamespace(surveys=Surveys(survey)),
+        survey=survey,
         **more,
     )
     return cast(Registration, found)

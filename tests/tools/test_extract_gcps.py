@@ -43,7 +43,7 @@ def test_points_lie_where_the_true_rpcs_see_them(scene: Scene, tmp_path: Path) -
     assert (tmp_path / "gcps.gpkg").exists()
     assert "accepted" in result.lines()[0]
     survey = result.summary()["survey"]
-    assert survey["chips"] > survey["confirming"] > survey["chips"] / 2
+    assert survey["chips"] >= survey["confirming"] > survey["chips"] / 2
     assert any(line.startswith("all over the overlap: ") for line in result.lines())
 
 
