@@ -127,6 +127,15 @@ def test_the_python_function_checks_too(needed: dict[str, Any]) -> None:
     assert not Path(needed["output"]).exists()
 
 
+def test_help_shows_every_parameter_with_its_values() -> None:
+    text = inspect.getdoc(toy) or ""
+    for parameter in TOY.all_parameters:
+        assert f"\n{parameter.name}" in text
+        assert parameter.kind.help in text
+    assert "\nsize : px, 1 to 9\n    How large.\n" in text
+    assert "\nmode : work, refuse, crash, wait\n" in text
+
+
 def test_the_python_function_runs_with_progress(needed: dict[str, Any]) -> None:
     seen: list[float] = []
     values = list(needed.values())

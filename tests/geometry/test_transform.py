@@ -152,6 +152,19 @@ def test_to_a_file_and_back(tmp_path: Path, kind: str, crs: CRS | None, grid: Gr
     assert load_transform(str(path)).model.kind == kind
 
 
+def test_transforms_and_models_are_compared_and_kept_in_sets_by_identity() -> None:
+    one, other = (misregistered("affine", UTM, GRID) for _ in range(2))
+    assert one == one and one != other
+    assert {one, other, one} == {other, one}
+    assert one.model != other.model
+
+
+@pytest.mark.parametrize("path", [None, {}])
+def test_a_transform_is_read_from_a_file(path: object) -> None:
+    with pytest.raises(TransformFileError, match="is read from a file"):
+        load_transform(path)  # type: ignore[arg-type]
+
+
 def damaged(**changes: object) -> str:
     return json.dumps(Transform.nominal(UTM, GRID).to_json() | changes)
 

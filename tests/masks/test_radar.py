@@ -45,7 +45,7 @@ def test_positive_decibels_are_known_by_their_unit_or_name(
 ) -> None:
     random = np.random.default_rng(1)
     amplitude = 50 * np.sqrt(random.gamma(1, 1, (200, 200)))
-    path = write_raster(tmp_path / "a.tif", (20 * np.log10(amplitude) + 60).astype(np.float32))
+    path = write_raster(tmp_path / "a.tif", (20 * np.log10(amplitude) + 40).astype(np.float32))
     with rasterio.open(path, "r+") as dataset:
         if unit is not None:
             dataset.units = [unit]
@@ -57,6 +57,18 @@ def test_positive_decibels_are_known_by_their_unit_or_name(
         assert is_in_decibels(image) == is_stated
         # Of one look; the most homogeneous windows are so by chance, too.
         assert (variation2_of(image) > 0.3) == is_stated
+
+
+@pytest.mark.parametrize("unit", ["dB", ""])
+def test_what_is_too_large_for_decibels_is_none(tmp_path: Path, unit: str) -> None:
+    random = np.random.default_rng(2)
+    amplitude = (300 * np.sqrt(random.gamma(1, 1, (200, 200)))).astype(np.uint16)
+    path = write_raster(tmp_path / "a.tif", amplitude)
+    with rasterio.open(path, "r+") as dataset:
+        dataset.units = [unit]
+    with open_raster(path) as source:
+        assert not is_in_decibels(Image(source))
+        assert variation2_of(Image(source)) > 0.3
 
 
 def test_power_is_zero_where_invalid() -> None:

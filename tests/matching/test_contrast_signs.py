@@ -61,6 +61,12 @@ def test_a_layer_over_different_grounds_has_one_sign(tmp_path: Path, context: Co
     assert signs.negative == 0
 
 
+def test_noise_has_either_sign_as_often(tmp_path: Path, context: Context) -> None:
+    noise = np.random.default_rng(8).normal(100, 5, (SIDE, SIDE))
+    signs = signs_of(tmp_path, 100 * speckle(9), noise, context)
+    assert max(signs.positive, signs.negative) < 0.15
+
+
 def test_constant_windows_have_no_sign(tmp_path: Path, context: Context) -> None:
     signs = signs_of(tmp_path, grey(7), np.full((SIDE, SIDE), 40.0), context)
     assert signs == ContrastSigns(0, 0)

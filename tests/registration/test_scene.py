@@ -142,6 +142,8 @@ def test_a_layer_may_hide_that_images_are_of_two_sensors(
     info = SceneInfo(facts(rough, is_known_radar=is_known), facts(smooth))
     assert info.may_be_different == expected
     assert replace(info, declared="reference").may_be_different
+    both = replace(info, input=facts(smooth, is_known_radar=True))
+    assert replace(both, reference=facts(rough, is_known_radar=True)).may_be_different is False
     for declared in (BOTH, NEITHER):
         assert not replace(info, declared=declared).may_be_different
 

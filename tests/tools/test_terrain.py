@@ -117,6 +117,7 @@ def test_a_radar_image_of_hills_is_matched_with_their_terrain_model_at_twice_its
         ({"views": "terrain sun azimuth=400"}, "states no light"),
         ({"views": "terrain sun"}, "needs its azimuth"),
         ({"views": "terrain radar; camera azimuth=1 incidence=2"}, "go with a surface model"),
+        ({"views": "terain sun azimuth=155"}, "or state that the reference holds heights"),
     ],
 )
 def test_what_does_not_go_together_is_refused(
@@ -124,6 +125,12 @@ def test_what_does_not_go_together_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match=message):
         groundtie.coregister(hills / "reference.tif", hills / "input.tif", **given)
+
+
+@pytest.mark.slow
+def test_a_vertical_datum_goes_with_heights(hills: Path) -> None:
+    with pytest.raises(ParameterError, match=r"dem_datum.* goes with a terrain model"):
+        groundtie.register(hills / "reference.tif", hills / "input.tif", dem_datum="EGM96")
 
 
 @pytest.mark.slow

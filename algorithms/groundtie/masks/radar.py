@@ -22,6 +22,10 @@ LEAST_VARIATION2, LEAST_VARIATION2_RATIO = 0.05, 9.0
 # radar_likeness); standardised images have 4.7 between 1 and 99 %.
 _LEAST_DB, _MOST_DB, _LEAST_RANGE_DB = -60.0, 40.0, 10.0
 
+# Stated decibels are smaller: 20 log10 of the largest amplitude of 16 bits is 96.3. Others are
+# scaled, or the statement is wrong.
+_MOST_STATED_DB = 100.0
+
 
 def variation2_of(image: Image) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
@@ -29,8 +33,7 @@ def variation2_of(image: Image) -> float:
     Grey values are assumed to be amplitudes, or decibels.
     """
     patch = _sample(image)
-    is_logarithmic = _states_decibels(image) or _holds_decibels(patch)
-    amplitude = to_amplitude(patch) if is_logarithmic else patch
+    amplitude = to_amplitude(patch) if _holds_decibels(image, patch) else patch
     return homogeneous_variation2(power(amplitude), patch.valid)
 
 
@@ -41,9 +44,8 @@ def is_in_decibels(image: Image) -> bool:
     negative values, such as indices and standardised ones, have a larger or a much smaller range.
     Decibels that are all positive cannot be told from grey values.
     """
-    if _states_decibels(image):
-        return True
-    return image.source.dtype.kind != "u" and _holds_decibels(_sample(image))
+    may_be = image.source.dtype.kind != "u" or _states_decibels(image)
+    return may_be and _holds_decibels(image, _sample(image))
 
 
 def to_amplitude(patch: Patch) -> Patch:
@@ -67,8 +69,10 @@ def _states_decibels(image: Image) -> bool:
     return any(source.bands[number - 1].is_in_decibels for number in numbers)
 
 
-def _holds_decibels(patch: Patch) -> bool:
+def _holds_decibels(image: Image, patch: Patch) -> bool:
     known = patch.values[patch.valid]
+    if _states_decibels(image) and np.abs(known).max(initial=0) <= _MOST_STATED_DB:
+        return True
     if not has_negative(known) or known.min() < _LEAST_DB or known.max() > _MOST_DB:
         return False
     low, high = np.percentile(known, (1, 99))

@@ -126,6 +126,8 @@ def asked_terrain(given: Mapping[str, Any]) -> dict[str, Any]:
     dem, input_dem = given.get("dem"), given.get("input_dem")
     if input_dem is not None and dem is None:
         raise ParameterError("the input's terrain model (input_dem) goes with another one (dem)")
+    if given.get("dem_datum") is not None and dem is None:
+        raise ParameterError("a vertical datum (dem_datum) goes with a terrain model (dem)")
     model = given.get("model", AUTO)
     if dem is not None and model != AUTO:
         raise ParameterError(f"a terrain model (dem) goes with model {AUTO}, not {model}")

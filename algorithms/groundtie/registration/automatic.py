@@ -113,8 +113,6 @@ def register_anything(
     """
     if _needs_rpcs(parameters["input"]):
         return _by_rpcs(parameters, progress)
-    if parameters["dem_datum"] is not None and parameters["dem"] is None:
-        raise ParameterError("a vertical datum (dem_datum) goes with a terrain model (dem)")
     call = Call.of(parameters, progress)
     with threads(parameters["workers"], progress) as context:
         asked = asked_terrain(parameters) | {"max_error_px": parameters["max_error"]}

@@ -215,7 +215,7 @@ class SceneInfo:
 
         A layer drawn over both reduces speckle, and the camera's noise alike.
         """
-        if self.declared in (BOTH, NEITHER):
+        if self.declared in (BOTH, NEITHER) or self.apparent is Sensors.RADARS:
             return False
         is_rough = self.radar.variation2 >= _LEAST_BENEATH_LAYER * LEAST_VARIATION2
         return self.apparent is Sensors.DIFFERENT or (is_rough and self._is_far_rougher)

@@ -93,8 +93,8 @@ def parts_map(survey: Survey) -> Figure:
     px = survey.centres.astype(float)
     axes.plot(*px[confirming].T, "o", color=figures.FIT_COLOUR, ms=6)
     hardly = other & survey.is_unsupporting_chip
-    axes.plot(*px[hardly].T, "o", color=figures.REJECTED_COLOUR, mfc="none", ms=6)
-    axes.plot(*px[other & ~hardly].T, "x", color=figures.REJECTED_COLOUR, ms=6)
+    axes.plot(*px[hardly].T, "o", color=figures.REJECTED_COLOUR, mfc="none", ms=7, mew=2)
+    axes.plot(*px[other & ~hardly].T, "x", color=figures.REJECTED_COLOUR, ms=7, mew=2)
     if not parts:
         return axes.figure
     farthest_px = max(part.distance_px for part in parts)
