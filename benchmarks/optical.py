@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from .accuracy import CORRECT, REFUSED
-from .attempt import Outcome, accepted, count
-from .cases import read_cases
+from .attempt import Outcome, Pair, accepted, attempt, count
+from .cases import RealCase, read_cases
 from .cloudy_rates import (
     BANDS,
     KERNEL,
@@ -23,22 +23,43 @@ from .cloudy_rates import (
     for_others,
 )
 from .cloudy_registrations import TOOLS, CloudyRegistration
-from .crossings import counts_by_group, what_was_accepted
+from .crossings import Crossing, counts_by_group, what_was_accepted
 from .match_rates import LIMITS_PX, METHODS, ClearCase, MatchRate
-from .optical_registrations import TOOL, FreeCrossing, RegistrationCase, crossings
 from .optical_speed import SOURCE, time_features, timing_goals, timing_table
-from .real import FreeCase
-from .rotated_pairs import crossed, rotated_cases
+from .real import FreeCase, ShiftedCase
+from .rotated_pairs import RotatedCase, crossed, rotated_cases, strides
 from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wrong, run_cases
 from .tables import accuracy_table
+
+TOOL = "match_optical"
 
 KINDS = ("optical-optical", "optical-infrared", "day-night")
 _ROTATED = ("optical-optical-rotated", "optical-infrared-rotated")
 
+FREE_CROSSING = "another place, without georeferencing"
 CLOUDED = "Registrations under clouds over half of the input"
 
 # Wanted share of correct registrations.
 _WANTED_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class FreeCrossing:
+    """Images of different places, without georeferencing."""
+
+    crossed: RotatedCase
+
+    def run(self, workers: int | None) -> Outcome:
+        """Register the pair, which must be refused."""
+        assert self.crossed.input is not None
+        reference, other = self.crossed.case, self.crossed.input
+        name = f"{reference.name} × {other.stem}"
+        return attempt(name, FREE_CROSSING, Pair(reference.reference, other), workers, tool=TOOL)
+
+
+def crossings(cases: Sequence[RealCase]) -> list[Crossing]:
+    """Return references with the inputs of some other places, georeferenced to the same place."""
+    return [Crossing(one, other, TOOL) for one, other in strides(cases) if one.place != other.place]
 
 
 def run(settings: Settings) -> SuiteResult:
@@ -52,7 +73,7 @@ def run(settings: Settings) -> SuiteResult:
     cloudy = _rates(
         [CloudyCase(case, for_others(labels, case.name)) for case in cases], settings.jobs
     )
-    registrations: list[Case] = [RegistrationCase(case) for case in cases]
+    registrations: list[Case] = [ShiftedCase(case, 0, tool=TOOL) for case in cases]
     registrations += [FreeCase(case, TOOL, case.kind) for case in turned]
     outcomes = run_cases(registrations, settings.jobs)
     clouded = [

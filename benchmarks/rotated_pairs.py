@@ -27,7 +27,7 @@ _SIDE_PX = 256
 _CROSSED = "crossed"
 
 # The inputs that each reference is crossed with: this many places further in the list.
-STRIDES = (1, 4, 11, 17)
+_STRIDES = (1, 4, 11, 17)
 
 # Two cases of one place, found by visual inspection: their file names differ.
 _SAME_PLACE = {"oi-rotated/80", "oi-rotated/100"}
@@ -81,16 +81,20 @@ def rotated_cases(folder: Path) -> list[RealCase]:
     return list(read_cases(folder, LARGEST_ERROR_PX))
 
 
-def crossed(cases: Sequence[RealCase]) -> list[RotatedCase]:
-    """Return references paired with the inputs of other places."""
-    pairs = [
+def strides(cases: Sequence[RealCase]) -> list[tuple[RealCase, RealCase]]:
+    """Return each case with some of the others."""
+    return [
         (case, cases[(index + stride) % len(cases)])
         for index, case in enumerate(cases)
-        for stride in STRIDES
+        for stride in _STRIDES
     ]
+
+
+def crossed(cases: Sequence[RealCase]) -> list[RotatedCase]:
+    """Return references paired with the inputs of other places."""
     return [
         RotatedCase(case, other.input)
-        for case, other in pairs
+        for case, other in strides(cases)
         if not {case.name, other.name} <= _SAME_PLACE
     ]
 

@@ -119,7 +119,7 @@ class CityCase:
             one = tried(lambda: wanted.call(scene, output, workers))
             if one.result is None:
                 return one.unregistered(name, self.group, 0.0)
-            error_px = true_error_px(scene, output)
+            error_px = rms(misses_px(scene, output))
         verdict, summary = judge(error_px), one.result.summary()
         return Outcome(
             name,
@@ -142,8 +142,8 @@ def group_name(what: str, size: int, looks: float) -> str:
     return f"{what}, {size} px, {looks:g} looks"
 
 
-def true_error_px(scene: Path, output: Path) -> float:
-    """Return the RMSE at a scene's check points on the ground, in image pixels.
+def misses_px(scene: Path, output: Path) -> FloatArray:
+    """Return the misses at a scene's check points on the ground, image pixels, shape (n, 2).
 
     Parameters
     ----------
@@ -157,11 +157,11 @@ def true_error_px(scene: Path, output: Path) -> float:
     crs = crs_of(scene / "reference.tif")
     checks = scene / "check_points.csv"
     if output.suffix != ".csv":
-        return rms(misses(read_rpc(output), checks, crs))
-    exact = read_rpc(scene / "exact_rpc.txt")
-    off = misses(exact, output, crs)
+        return misses(read_rpc(output), checks, crs)
+    off = misses(read_rpc(scene / "exact_rpc.txt"), output, crs)
     change, *_ = np.linalg.lstsq(_terms(image_positions(output)), off, rcond=None)
-    return rms(_terms(image_positions(checks)) @ change)
+    missed: FloatArray = -(_terms(image_positions(checks)) @ change)
+    return missed
 
 
 def _terms(px: FloatArray) -> FloatArray:

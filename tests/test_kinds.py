@@ -87,6 +87,11 @@ def test_values_come_out_in_their_proper_type(kind: Kind, value: Any, expected: 
         (Number(**TEXTS, maximum=3), 4, "size must be at most 3, not 4"),
         (Distance(**TEXTS), -0.5, "size must be at least 0 m, not -0.5"),
         (Choice(**TEXTS, choices=("a", "b")), "c", "size must be one of a, b, not 'c'"),
+        (
+            Choice(**TEXTS, choices=("a", "b")),
+            np.arange(2),
+            "size must be one of a, b, not array([0, 1])",
+        ),
         (Flag(**TEXTS), "yes", "size must be true or false, not 'yes'"),
         (Text(**TEXTS), 3, "size must be a text, not 3"),
         (Band(**TEXTS, of="input"), 0, "size must be at least 1, not 0"),

@@ -22,7 +22,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from .declaration import Parameter, Tool
-from .errors import CancelledError, GroundTieError, NotRegisteredError, OutputError
+from .errors import CancelledError, GroundTieError, NotRegisteredError, OutputError, one_line
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
 from .packages import use_one_thread
@@ -72,7 +72,7 @@ def _fail(message: str, exit_code: int) -> int:
 
 
 def _usage(error: click.ClickException) -> str:
-    message = " ".join(error.format_message().split())
+    message = one_line(error.format_message())
     if isinstance(error, click.UsageError) and error.ctx is not None:
         message = f"{message.rstrip('.')} (see {error.ctx.command_path} --help)"
     return message

@@ -16,7 +16,7 @@ class GroundTieError(Exception):
 
     def one_line(self) -> str:
         """Return the message on one line."""
-        return " ".join(str(self).split())
+        return one_line(self)
 
 
 class ParameterError(GroundTieError, ValueError):
@@ -119,6 +119,11 @@ class NotRegisteredError(GroundTieError, RuntimeError):
         """Return the facts of the refusal as JSON values."""
         values = {} if self.verdict is None else {"verdict": self.verdict.summary()}
         return values | ({"tried": list(self.tried)} if self.tried else {})
+
+
+def one_line(text: object) -> str:
+    """Return a text, or what an object is as a text, on one line."""
+    return " ".join(str(text).split())
 
 
 def raised_by(error: Exception, package: str) -> bool:

@@ -18,7 +18,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import spawn
 from typing import Any, ParamSpec, TypeVar
 
-from .errors import ParameterError, SchedulerError, WorkerLostError
+from .errors import ParameterError, SchedulerError, WorkerLostError, raised_by
 from .memory import set_heaps
 from .packages import use_one_thread
 
@@ -221,7 +221,7 @@ def result_of(future: Future[T]) -> T:
     except FutureCancelledError as error:
         raise SchedulerError("the scheduler was lost") from error
     except Exception as error:
-        if type(error).__module__.partition(".")[0] not in ("concurrent", "distributed"):
+        if not (raised_by(error, "concurrent") or raised_by(error, "distributed")):
             raise
         raise WorkerLostError(f"its worker was lost: {error}") from error
 

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from .errors import one_line
 from .packages import PACKAGES, Package
 from .version import __version__
 
@@ -110,7 +111,7 @@ def _package(package: Package) -> Finding:
     try:
         module = importlib.import_module(package.imported)
     except Exception as error:  # any error is a finding
-        return Finding(package.name, absent, f"broken: {_one_line(error)}", without)
+        return Finding(package.name, absent, f"broken: {_in_a_line(error)}", without)
     version = _version(package, module)
     if _numbers(version) < _numbers(package.oldest):
         text = f"{version} is too old, {package.oldest} is needed"
@@ -136,8 +137,8 @@ def _numbers(version: str) -> tuple[int, ...]:
     return tuple(map(int, re.findall(r"\d+", version)[:2]))
 
 
-def _one_line(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
+def _in_a_line(error: Exception) -> str:
+    return one_line(f"{type(error).__name__}: {error}")
 
 
 def _gdal() -> list[Finding]:
@@ -162,7 +163,7 @@ def _proj() -> Finding:
     try:
         x, y = (values[0] for values in transform("EPSG:4326", "EPSG:32633", *zip(_LON_LAT)))
     except Exception as error:  # see `_package`
-        return Finding("PROJ's data", MISSING, f"broken: {_one_line(error)}", ("every tool",))
+        return Finding("PROJ's data", MISSING, f"broken: {_in_a_line(error)}", ("every tool",))
     if abs(x - _UTM_33[0]) + abs(y - _UTM_33[1]) > 1e-3:
         text = f"wrong: {_LON_LAT} in EPSG:32633 is {x:.3f}, {y:.3f} by them"
         return Finding("PROJ's data", MISSING, text, ("every tool",))

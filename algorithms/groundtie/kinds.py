@@ -264,11 +264,12 @@ class Choice(Kind):
         return ", ".join(self.choices)
 
     def check(self, name: str, value: Any) -> str:
-        if isinstance(value, str) and value.replace("-", "_") in self.choices:
-            return value.replace("-", "_")
-        if value not in self.choices:
-            raise ParameterError(f"{name} must be one of {', '.join(self.choices)}, not {value!r}")
-        return str(value)
+        for word in (value.replace("-", "_"), value) if isinstance(value, str) else ():
+            if word in self.choices:
+                return word
+        raise ParameterError(
+            f"{name} must be one of {', '.join(self.choices)}, not {_shown(value)}"
+        )
 
 
 class Flag(Kind):

@@ -58,11 +58,6 @@ class Attack:
     fits: Callable[[Scene], bool] = lambda scene: True
 
     @property
-    def is_control(self) -> bool:
-        """Whether the pair should be registered."""
-        return self.group == CONTROLS
-
-    @property
     def is_example(self) -> bool:
         """Whether it stands for a single pair of files."""
         return self.group == EXAMPLES

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ..cases import SAR_OPTICAL, read_image
-from .catalogue import EXAMPLES, Attack, Setting
+from .catalogue import EXAMPLES, Attack
+from .noise import untouched
 from .pairs import Pair, Source, pixels
 from .scenes import Scene, to_grey
 
@@ -57,13 +58,8 @@ def is_example(scene: Scene) -> bool:
     return isinstance(scene, Example)
 
 
-def as_it_is(pair: Pair, setting: Setting) -> Pair:
-    """Return the pair unchanged."""
-    return pair
-
-
 def _named(name: str) -> Attack:
-    return Attack(EXAMPLES, name, "", as_it_is, lambda scene: scene.name == name)
+    return Attack(EXAMPLES, name, "", untouched, lambda scene: scene.name == name)
 
 
 ATTACKS = [_named(name) for name in _KNOWN]

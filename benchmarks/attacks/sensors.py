@@ -18,11 +18,10 @@ import numpy as np
 import rasterio
 
 import groundtie
-from groundtie.sensor.rpc_files import read_rpc
 
 from ..accuracy import FloatArray
-from ..rpc import crs_of, image_positions, misses
-from ..rpc_city import RUNS, judge
+from ..rpc import image_positions
+from ..rpc_city import RUNS, judge, misses_px
 from ..simulations import kept, simulator_version
 from .catalogue import SENSOR, direction
 from .overlays import OVERLAYS
@@ -169,19 +168,8 @@ class SensorCase:
 
 
 def errors_px(scene: Path, output: Path, moved: Moved) -> FloatArray:
-    """Return the misses of a tool's output at the scene's check points, shape (n, 2).
-
-    Ground control points are judged by the affine change of the image that fits them best.
-    """
-    crs = crs_of(scene / "reference.tif")
-    checks = scene / "check_points.csv"
-    px = image_positions(checks)
-    if output.suffix != ".csv":
-        return misses(read_rpc(output), checks, crs) + moved(px)
-    off = misses(read_rpc(scene / "exact_rpc.txt"), output, crs)
-    at = image_positions(output)
-    change, *_ = np.linalg.lstsq(np.column_stack([np.ones(len(at)), at]), off, rcond=None)
-    return moved(px) - np.column_stack([np.ones(len(px)), px]) @ change
+    """Return the misses of a tool's output for the attacked image, as `misses_px` does."""
+    return moved(image_positions(scene / "check_points.csv")) + misses_px(scene, output)
 
 
 def sensor_cases(seeds: Sequence[int], cache: Path) -> list[SensorCase]:

@@ -27,8 +27,15 @@ from benchmarks.cloudy_rates import (
 )
 from benchmarks.cloudy_registrations import CloudyRegistration
 from benchmarks.match_rates import METHODS, ClearCase, MatchRate
-from benchmarks.optical import cloud_table, goals, mean_table, pair_table
-from benchmarks.optical_registrations import FREE_CROSSING, FreeCrossing, crossings
+from benchmarks.optical import (
+    FREE_CROSSING,
+    FreeCrossing,
+    cloud_table,
+    crossings,
+    goals,
+    mean_table,
+    pair_table,
+)
 from benchmarks.optical_speed import REGISTRATION, SURF, Timing, timing_goals, timing_table
 from benchmarks.rotated_pairs import RotatedCase
 from benchmarks.suites import none_wrong

@@ -14,6 +14,7 @@ from benchmark_outcomes import outcome
 import groundtie
 from benchmarks import rpc_city
 from benchmarks.accuracy import CORRECT, CRASHED, INACCURATE, REFUSED, SILENTLY_WRONG
+from benchmarks.rpc import rms
 from benchmarks.rpc_city import EXTRACTED, MODELLED, REFINED, RUNS, City, CityCase
 from benchmarks.suites import Settings, SuiteResult
 from groundtie.errors import NotRegisteredError
@@ -74,9 +75,9 @@ def test_rpcs_are_wrong_by_what_they_are_moved(scene: Path, tmp_path: Path) -> N
     exact = read_rpc(scene / "exact_rpc.txt")
     refined = tmp_path / "refined_RPC.TXT"
     write_rpc(refined, exact)
-    assert rpc_city.true_error_px(scene, refined) < 1e-3
+    assert rms(rpc_city.misses_px(scene, refined)) < 1e-3
     write_rpc(refined, exact.shifted(np.array([3.0, 4.0])))
-    assert rpc_city.true_error_px(scene, refined) == pytest.approx(5.0, abs=1e-3)
+    assert rms(rpc_city.misses_px(scene, refined)) == pytest.approx(5.0, abs=1e-3)
 
 
 def write_points(scene: Path, path: Path, off: np.ndarray, end: str = "fit,used") -> None:
@@ -97,12 +98,12 @@ def test_ground_control_is_as_wrong_as_what_its_points_have_in_common(
 ) -> None:
     points = tmp_path / "points.csv"
     write_points(scene, points, np.array([[3.0, 4.0]]))
-    assert rpc_city.true_error_px(scene, points) == pytest.approx(5.0, abs=0.01)
+    assert rms(rpc_city.misses_px(scene, points)) == pytest.approx(5.0, abs=0.01)
     count = len((scene / "check_points.csv").read_text().split()) - 1
     noise = np.random.default_rng(0).normal(0, 1.0, (count, 2))
     write_points(scene, points, noise)
     # Three parameters for each coordinate are fitted to so many points.
-    assert rpc_city.true_error_px(scene, points) < 3 * math.sqrt(6 / count)
+    assert rms(rpc_city.misses_px(scene, points)) < 3 * math.sqrt(6 / count)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from groundtie.errors import ParameterError
-from groundtie.geometry.views import View, parse_view, read_view, split_views
+from groundtie.geometry.views import View, files_beside, parse_view, read_view, split_views
 
 STAC = {
     "view:azimuth": 100.0,
@@ -78,6 +78,12 @@ def test_an_incidence_angle_follows_from_the_angle_off_nadir(
 def test_an_angle_off_nadir_that_misses_the_earth_is_no_view(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="must be 0 to 80"):
         read_view(item(tmp_path / "a.json", {"view:azimuth": 100.0, "view:off_nadir": 80.0}))
+
+
+@pytest.mark.parametrize("name", [".", "/", "a" * 250 + ".tif", "a" * 300 + ".tif"])
+def test_nothing_lies_beside_a_name_that_no_file_can_have(name: str) -> None:
+    assert View.of(name, None) is None
+    assert list(files_beside(Path(name))) == []
 
 
 def test_the_item_beside_an_image_is_found(tmp_path: Path) -> None:

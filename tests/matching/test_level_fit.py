@@ -17,8 +17,11 @@ from textured_pairs import (
 
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
+from groundtie.matching import level_fit
+from groundtie.matching.belief_propagation import Surfaces
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.level_fit import CoarseModel, fit_level
+from groundtie.rasters.grid import FloatArray
 from groundtie.rasters.pair import ImagePair
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -64,6 +67,29 @@ def test_a_correction_comes_before_the_model_that_is_known(
         start = similarity((20, 10), 3.0)
         found = fitted(pair, start, context)
     assert error_m(found.model, files) < 10
+
+
+@pytest.mark.parametrize("size", [(100, 100), (150, 191), (400, 150), (512, 512)])
+def test_chips_support_their_neighbours_however_small_the_level(
+    tmp_path: Path, size: tuple[int, int], context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A chip amid others has eight neighbours at least, one in a corner three."""
+    seen: list[tuple[FloatArray, float]] = []
+
+    def remember(surfaces: Surfaces, centres: FloatArray, reach_px: float) -> Surfaces:
+        seen.append((centres, reach_px))
+        return surfaces
+
+    monkeypatch.setattr(level_fit, "propagate", remember)
+    with write_textured_pair(tmp_path, size, similarity((0, 0), 0.0)).opened() as pair:
+        fitted(pair, shift_on_map(0, 0), context)
+    (centres, reach_px), *_ = seen
+    apart = np.hypot(*(centres[:, None] - centres).transpose(2, 0, 1))
+    neighbours = (apart <= reach_px).sum(axis=1) - 1
+    columns, rows = (np.unique(along) for along in centres.T)
+    amid = np.isin(centres[:, 0], columns[1:-1]) & np.isin(centres[:, 1], rows[1:-1])
+    assert amid.any() and neighbours[amid].min() >= 8
+    assert neighbours.min() >= 3
 
 
 def test_two_places_have_nothing_in_common(other_place: TexturedPair, context: Context) -> None:

@@ -96,6 +96,7 @@ def surveys_of(
 
 
 @pytest.mark.parametrize("off", [(40, -25), (-22, 0), (0, -70)])
+@pytest.mark.slow
 def test_a_part_beyond_the_radius_is_found(
     off: tuple[int, int], tmp_path: Path, context: Context
 ) -> None:
@@ -112,6 +113,7 @@ def test_a_part_beyond_the_radius_is_found(
     assert part.chips == pytest.approx(len(found.whole.centres) / 3, rel=0.35)
 
 
+@pytest.mark.slow
 def test_a_forest_may_be_displaced_as_far_in_a_radar_image(
     tmp_path: Path, context: Context
 ) -> None:
@@ -141,6 +143,7 @@ def test_a_forest_may_be_displaced_as_far_in_a_radar_image(
 
 
 @pytest.mark.parametrize("shows", ["another place", "nothing", "what lies there"])
+@pytest.mark.slow
 def test_what_does_not_match_is_no_part_far_off(
     shows: str, tmp_path: Path, context: Context
 ) -> None:
@@ -168,6 +171,7 @@ def far_apart(off: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("contrast", [-6.0, 6.0])
 @pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
+@pytest.mark.slow
 def test_shadows_and_roofs_do_not_hide_that_the_ground_lies_elsewhere(
     moved: tuple[int, int], contrast: float, tmp_path: Path, context: Context
 ) -> None:
@@ -186,6 +190,7 @@ def test_shadows_and_roofs_do_not_hide_that_the_ground_lies_elsewhere(
 
 @pytest.mark.parametrize("is_input_radar", [False, True])
 @pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
+@pytest.mark.slow
 def test_bright_roofs_in_shadows_do_not_hide_that_the_ground_lies_elsewhere(
     moved: tuple[int, int], is_input_radar: bool, tmp_path: Path, context: Context
 ) -> None:
@@ -233,6 +238,7 @@ def test_ground_shows_that_a_copy_was_blended_into(
 
 
 @pytest.mark.parametrize("offset", [(6.0, -4.0), (6.4, -3.7)])
+@pytest.mark.slow
 def test_over_the_image_of_a_sensor_lies_no_map_layer(
     offset: tuple[float, float], tmp_path: Path, context: Context
 ) -> None:
@@ -254,6 +260,7 @@ def test_a_view_of_one_sensor_and_a_copy_show_nothing_elsewhere(
         assert deviations_of_unexplained(surveys, ELSEWHERE_PX) < REST_PEAK_DEVIATIONS
 
 
+@pytest.mark.slow
 def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
     tmp_path: Path, context: Context
 ) -> None:
@@ -263,6 +270,7 @@ def test_what_a_radar_and_a_camera_show_alike_is_no_view_of_one_sensor(
     assert rest.survey is not None
 
 
+@pytest.mark.slow
 def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context: Context) -> None:
     """Most of both images is the same clouds, with sharp rims, over two places."""
     clouds = texture(SIDE, SIDE, 30) > -1.2
@@ -274,6 +282,7 @@ def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context:
     assert rest is not None and rest.shared.is_explained and rest.survey is not None
 
 
+@pytest.mark.slow
 def test_of_a_view_whose_edges_are_no_sharper_than_ground_nothing_more_is_asked(
     tmp_path: Path, context: Context
 ) -> None:
@@ -302,6 +311,7 @@ def test_views_with_edges_as_sharp_as_drawn_ones_are_taken_for_such_at_whole_pix
     assert deviations_of_unexplained(surveys, ELSEWHERE_PX) < REST_PEAK_DEVIATIONS
 
 
+@pytest.mark.slow
 def test_what_is_drawn_is_not_looked_behind(tmp_path: Path, context: Context) -> None:
     """The same lines over two places."""
     images = [noisy(place(), 1), noisy(place()[::-1], 2)]
@@ -330,6 +340,7 @@ def test_what_two_radar_images_have_not_in_common_shows_where_a_part_lies(
 
 
 @pytest.mark.parametrize("is_one_place", [True, False])
+@pytest.mark.slow
 def test_what_two_sensors_have_in_common_is_looked_behind(
     is_one_place: bool, tmp_path: Path, context: Context
 ) -> None:

@@ -79,6 +79,7 @@ def test_voids_of_large_regions_take_no_part_in_means(
 
 
 @pytest.mark.parametrize("size", [300, 1300])
+@pytest.mark.slow
 def test_voids_that_are_open_to_the_edge_stay(tmp_path: Path, size: int) -> None:
     """What lies behind them is not known; those that valid pixels enclose are filled."""
     heights = ramp(size, size) / 10

@@ -104,6 +104,7 @@ def test_where_nothing_is_found_the_registration_has_a_verdict_alone(
 
 
 @pytest.mark.parametrize(("shift_m", "is_near"), [((-53.0, 44.0), True), ((-203.0, 157.0), False)])
+@pytest.mark.slow
 def test_images_that_are_placed_are_matched_from_there_alone(
     tmp_path: Path, context: Context, shift_m: tuple[float, float], is_near: bool
 ) -> None:
@@ -190,6 +191,7 @@ def test_a_towns_ground_is_found_once_and_matched_by_one_joint_histogram(
         assert isinstance(stages.matcher, PooledHistogramMatcher)
 
 
+@pytest.mark.slow
 def test_what_may_be_a_town_in_large_pixels_is_not_tried_by_its_ground(
     tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -160,6 +160,7 @@ class TestWhatIsWrittenOverNothing:
         found.warp(output=output)
         assert mask.read_bytes() == b""
 
+    @pytest.mark.slow
     def test_nor_over_an_input_from_another_working_folder(
         self, textured: TexturedPair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -96,6 +96,7 @@ def test_the_model_does_not_depend_on_the_unit_of_covariances(kind: str, times: 
 
 
 @pytest.mark.parametrize("times", [1.0, 20.0])
+@pytest.mark.slow
 def test_noise_is_no_drift(times: float) -> None:
     found = []
     for seed in range(40):

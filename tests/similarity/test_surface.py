@@ -10,7 +10,7 @@ from textured_pairs import texture
 from groundtie.context import threads
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.description import BORDER_PX
-from groundtie.similarity.measures import MEASURES, measure, ncc, of_histograms
+from groundtie.similarity.measures import MEASURES, of_histograms
 from groundtie.similarity.surface import (
     SIMILARITIES,
     SimilaritySettings,
@@ -160,11 +160,6 @@ def test_windows_without_content_are_finite(similarity: str) -> None:
     half = np.where(np.arange(SIDE) < 0.7 * SIDE, np.float32(0), template.values)
     surface = surface_of(Patch(half, template.valid), search, settings)
     assert np.isfinite(surface).all()
-
-
-def test_a_measure_is_registered_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(MEASURES, "ncc")
-    assert measure("ncc")(ncc) is MEASURES["ncc"] is ncc
 
 
 def test_threads_change_nothing() -> None:

@@ -53,6 +53,7 @@ def other_place(values: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shown", [noise_image, other_place])
+@pytest.mark.slow
 def test_what_is_not_the_same_place_is_refused(
     textured: TexturedPair, tmp_path: Path, shown: Any
 ) -> None:

@@ -344,6 +344,7 @@ def test_a_refused_series_keeps_no_registrations(tmp_path: Path) -> None:
         assert not out.exists() or not [*out.iterdir()]
 
 
+@pytest.mark.slow
 def test_a_date_beside_the_map_of_the_series_costs_no_other(tmp_path: Path) -> None:
     """It is reached by the date between; the reference's grid has no pixel of it."""
     ground, rng = 128 + 40 * texture(300, 840), np.random.default_rng(3)

@@ -105,6 +105,7 @@ def test_where_no_height_is_known_there_is_no_data(files: dict[str, Path], tmp_p
 
 @pytest.mark.parametrize("rise_m", [30.0, -30.0])
 @pytest.mark.parametrize("east_m", [-6.0, 0.0, 0.6])
+@pytest.mark.slow
 def test_a_wall_amid_the_image_does_not_tell_the_pixel_size(
     files: dict[str, Path], tmp_path: Path, east_m: float, rise_m: float
 ) -> None:

@@ -114,6 +114,7 @@ def test_an_image_with_rpcs_leaves_all_files_or_none(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_matches_at_two_places_is_not_tried_in_another_way(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,6 +140,7 @@ def test_what_matches_at_two_places_is_not_tried_in_another_way(
     assert tried == ["second place"]
 
 
+@pytest.mark.slow
 def test_what_the_images_are_is_asked_as_far_as_each_way_searches(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

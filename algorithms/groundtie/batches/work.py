@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..declaration import Tool
-from ..errors import CancelledError, GroundTieError, NotRegisteredError
+from ..errors import CancelledError, GroundTieError, NotRegisteredError, one_line
 from ..executors import enter_worker, stop_requested
 from ..kinds import plain
 from ..progress import Progress
@@ -127,7 +127,7 @@ def ended_by(error: Exception) -> Outcome:
         return Outcome(FAILED, error.one_line())
     message = f"this is a bug in GroundTie: {type(error).__name__}: {error}"
     trace = "".join(traceback.format_exception(error))
-    return Outcome(FAILED, " ".join(message.split()), traceback=trace)
+    return Outcome(FAILED, one_line(message), traceback=trace)
 
 
 def files_of(paths: tuple[Path, ...]) -> dict[str, tuple[int, int]]:

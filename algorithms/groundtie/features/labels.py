@@ -134,10 +134,8 @@ def raster_labels(source: RasterSource, left_out: Sequence[str]) -> RasterLabels
         The values to be left out are no numbers.
     """
     for text in left_out:
-        try:
-            float(text)
-        except ValueError:
-            raise ParameterError(f"left_out must be numbers for a raster, not {text!r}") from None
+        if _number(text) is None:
+            raise ParameterError(f"left_out must be numbers for a raster, not {text!r}")
     return RasterLabels(source, frozenset(left_out))
 
 

@@ -48,7 +48,7 @@ def metadata_beside(image: Path) -> Iterator[Path]:
     folder, stem = image.parent, image.stem
     yield folder / f"{stem}_extended.json"  # Capella
     yield folder / f"{re.sub('_(GEC|SICD|MM)$', '', stem)}_METADATA.json"  # Umbra
-    yield from (image.with_suffix(suffix) for suffix in (".xml", ".XML", ".IMD"))
+    yield from (folder / f"{stem}{suffix}" for suffix in (".xml", ".XML", ".IMD"))
     yield folder.parent / "annotation" / f"{stem}.xml"  # Sentinel-1
     if folder.name == "IMAGEDATA":  # TerraSAR-X
         yield folder.parent / f"{folder.parent.name}.xml"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -90,10 +91,9 @@ class View:
             return stated_view(given)
         if not isinstance(image, (str, Path)):
             return None
-        beside = Path(image).with_suffix(".json")
-        if _is_item(beside):
+        if _is_item(beside := _item_beside(Path(image))):
             return read_view(beside)
-        of_product = map(_product_view, metadata_beside(Path(image)))
+        of_product = map(_product_view, filter(os.path.isfile, metadata_beside(Path(image))))
         return next((view for view in of_product if view is not None), None)
 
 
@@ -114,9 +114,14 @@ def no_view(image: Any, name: str) -> ParameterError:
 
 def files_beside(image: Path) -> Iterator[Path]:
     """Yield the files beside an image that may state its view: STAC item, product's metadata."""
-    if _is_item(item := image.with_suffix(".json")):
+    if _is_item(item := _item_beside(image)):
         yield item
-    yield from filter(Path.is_file, metadata_beside(image))
+    # Names that are too long are none: `Path.is_file` would raise.
+    yield from filter(os.path.isfile, metadata_beside(image))
+
+
+def _item_beside(image: Path) -> Path:
+    return image.parent / f"{image.stem}.json"
 
 
 def split_views(words: str | None) -> tuple[str | None, str | None]:
@@ -204,8 +209,6 @@ def _incidence_deg(off_nadir_deg: float) -> float:
 
 def _product_view(path: Path) -> View | None:
     """Return the view in a file beside an image; None if the file is not metadata with a view."""
-    if not path.is_file():
-        return None
     try:
         stated = read_product_view(path)
     except (OSError, ValueError) as error:

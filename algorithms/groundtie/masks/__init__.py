@@ -1,1 +1,1 @@
-"""Masks that keep elevated objects out of the similarity."""
+"""Masks: which pixels of an image take part."""

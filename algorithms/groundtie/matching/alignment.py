@@ -28,7 +28,6 @@ from ..geometry.models import PARAMETERS, TERRAIN, Model
 from ..geometry.rows import Rows
 from ..geometry.terrain import Terrain
 from ..rasters.grid import FloatArray, PointFunction, apply_affine
-from ..rasters.kernels import bspline_weights
 from .belief_propagation import Surfaces
 from .families import Family, coefficients_of
 
@@ -193,7 +192,7 @@ def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Fie
 
 def _spline_coefficients(values: FloatArray) -> FloatArray:
     """Return the coefficients of cubic B-splines through values, (n, s, s), mirrored at borders."""
-    middle, side = bspline_weights(4, 0.0)[1], bspline_weights(4, 0.0)[0]
+    side, middle = _WEIGHTS[0, :2]
     size = values.shape[1]
     splines = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
     splines[0, 1] = splines[-1, -2] = 2 * side

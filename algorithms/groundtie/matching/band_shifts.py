@@ -78,8 +78,7 @@ def band_shifts(source: RasterSource) -> Sequence[BandShift]:
     if len(bands) < 2 or side < _LEAST_PX:
         return ()
     places = Places.spread(source.grid, side, lambda n: np.clip(n // side, 1, _MOST_ALONG))
-    corners = places.centres - side // 2
-    windows = [Window(int(col), int(row), side, side) for col, row in corners]
+    windows = [Window(int(col), int(row), side, side) for col, row in places.corners]
     known = before = _Band(_spectra(source, windows, bands[0]), bands[0], np.zeros(2))
     found = []
     for number in bands[1:]:

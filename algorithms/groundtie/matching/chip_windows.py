@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..context import Context
-from ..geometry.models import Model
 from ..rasters.grid import Grid, PointFunction
 from ..rasters.held_images import HeldImage
 from ..rasters.pair import ImagePair
@@ -64,13 +63,6 @@ class Resampled:
     to_input: PointFunction
     held: tuple[HeldImage, HeldImage] | None = None
     part_of: PartOf | None = None
-
-    @classmethod
-    def by_model(
-        cls, pair: ImagePair, model: Model, grid: Grid, reach_px: int, context: Context
-    ) -> Resampled:
-        """Resample images by the misregistration on the map; parameters as `of`."""
-        return cls.of(pair, pair.transform(model), grid, reach_px, context)
 
     @classmethod
     def of(
@@ -177,7 +169,7 @@ class ChipWindows:
 
     @property
     def _corners(self) -> NDArray[np.int_]:
-        return self.places.centres - self.places.chip_px // 2 - self.reach_px
+        return self.places.corners - self.reach_px
 
     @property
     def _most(self) -> int:

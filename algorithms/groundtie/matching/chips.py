@@ -90,7 +90,8 @@ class ChipMatcher:
 
     def resampled(self, model: Model, grid: Grid, radius_px: int, context: Context) -> Resampled:
         """Return the pair, resampled by a model, for matching within a radius on a grid."""
-        return Resampled.by_model(self.pair, model, grid, radius_px + BORDER_PX, context)
+        to_input = self.pair.transform(model)
+        return Resampled.of(self.pair, to_input, grid, radius_px + BORDER_PX, context)
 
     def match_forward(
         self, images: Resampled, places: Places, radius_px: int, context: Context

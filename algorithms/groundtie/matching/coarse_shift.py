@@ -16,7 +16,7 @@ from ..geometry.transform import Transform
 from ..pose.rotation_windows import read_windows
 from ..pose.search import find_poses
 from ..rasters.grid import Grid, near_longitude
-from ..rasters.pair import Image, ImagePair, require_content
+from ..rasters.pair import ImagePair, require_content
 from ..rasters.patch import Patch
 from ..similarity.correlation import MINIMUM_OVERLAP, overlap_share
 from ..similarity.description import BORDER_PX
@@ -195,19 +195,14 @@ def _patches(
         for more in (BORDER_PX, reach)
     )
     hidden = None if held_out is None else held_out(template)
-
-    def of_reference(image: Image) -> Patch:
-        return replace(pair, reference=image).reference_patch(template, hidden)
-
-    def of_input(image: Image) -> Patch:
-        return replace(pair, input=image).input_patch(search, pair.transform(model))
-
-    reading = context.executor.submit(of_reference, pair.reference)
-    input = of_input(pair.input)
+    of_reference = template, pair.reference.source.grid.map_to_pixel, hidden
+    of_input = search, pair.transform(model)
+    reading = context.executor.submit(pair.reference.read_onto, *of_reference)
+    input = pair.input.read_onto(*of_input)
     reference = reading.result()
     where = "where the images overlap"
-    require_content(pair.reference, reference, of_reference, where)
-    require_content(pair.input, input, of_input, where)
+    require_content(pair.reference, reference, where, *of_reference)
+    require_content(pair.input, input, where, *of_input)
     return reference, input
 
 

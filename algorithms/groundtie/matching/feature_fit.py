@@ -48,7 +48,7 @@ def fit_matches(kind: str, matches: Correspondences, prior: Affine, seed: int) -
     Parameters
     ----------
     kind
-        One of `models.KINDS`, or "auto" for the simplest polynomial that the matches justify.
+        One of `models.KINDS`, or "auto" for the simplest linear model that the matches justify.
     matches
         The matches, in matching pixels.
     prior

@@ -75,7 +75,7 @@ class KeypointFit:
         coarse
             The misregistration on the map, a model of degree 1; its error may be up to the gate.
         kind
-            One of `models.KINDS`, or "auto" for the simplest polynomial that the matches justify.
+            One of `models.KINDS`, or "auto" for the simplest linear model that the matches justify.
         context
             Threads, progress and seed.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import TooFewPointsError
+from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.chance import agreement_probability, log10_false_alarms
 from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import PARAMETERS, Model, fewest_points
@@ -67,8 +68,7 @@ def fit_level(
     centres, surfaces = matcher.match_forward(images, places, radius_px, context)
     if len(centres) < 4:
         return CoarseModel(model, np.inf)
-    step = (np.array(level.size) - chip) / (_CHIPS_PER_SIDE - 1)
-    supported = propagate(surfaces, centres, 1.5 * float(step.max()))
+    supported = propagate(surfaces, centres, NEIGHBOUR_SPACINGS * places.spacing_px)
     own = peak_shifts(surfaces)
     px = centres.astype(float)
     best = CoarseModel(model, np.inf)

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.rows import Rows
 from ..rasters.grid import FloatArray, Grid, mesh
 from ..similarity.peak import find_peak
@@ -60,6 +61,16 @@ class Places:
             for length in grid.size
         )
         return cls(grid, np.rint(mesh(*sides)).astype(int), chip_px)
+
+    @property
+    def corners(self) -> NDArray[np.int_]:
+        """First pixels (col, row) of the chips."""
+        return self.centres - self.chip_px // 2
+
+    @property
+    def spacing_px(self) -> int:
+        """Largest distance between successive columns or rows of chips."""
+        return max(int(np.diff(np.unique(along)).max(initial=0)) for along in self.centres.T)
 
 
 @dataclass(frozen=True)
@@ -153,7 +164,7 @@ class ChipSurfaces:
 
         if len(self.centres) == 0:
             return self
-        reach = 1.5 * spacing_px
+        reach = NEIGHBOUR_SPACINGS * spacing_px
         members = cKDTree(self.centres).query_ball_point(self.centres, reach, p=np.inf)
         return self._sums(self.centres, [np.sort(of) for of in members])
 

@@ -94,11 +94,13 @@ class PooledHistogramMatcher:
         TooFewPointsError
             The mask leaves too few pixels.
         """
-        images = Resampled.by_model(self._coloured, model, places.grid, radius_px, context)
+        pair = self._coloured
+        images = Resampled.of(pair, pair.transform(model), places.grid, radius_px, context)
         tiles = Places.tiles(places.grid, self.pooled_chip_px)
         histogram = self._histogram(images, tiles, context)
         order = 1 if self._is_reference_masked else -1
-        windows = self._windows(images, places, radius_px, self.blind)
+        hidden = self.held_out if self.blind else None
+        windows = ChipWindows(images, places, radius_px, hidden)
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
             template, search = self._template_first(reference, input)
@@ -160,7 +162,7 @@ class PooledHistogramMatcher:
             both = template.valid & search.valid
             return np.stack([smooth(template).values[both], search.values[both]])[:, ::every]
 
-        windows = self._windows(images, places, 0, blind=True)
+        windows = ChipWindows(images, places, 0, self.held_out)
         _, sampled = windows.map(singly(pixels), context.quiet())
         sample = np.concatenate(sampled, axis=1) if sampled else np.zeros((2, 0), np.float32)
         count = sample.shape[1] * every
@@ -185,11 +187,6 @@ class PooledHistogramMatcher:
     @property
     def _is_reference_masked(self) -> bool:
         return self.pair.reference.mask is not None
-
-    def _windows(
-        self, images: Resampled, places: Places, radius_px: int, blind: bool
-    ) -> ChipWindows:
-        return ChipWindows(images, places, radius_px, self.held_out if blind else None)
 
     def _template_first(self, reference: Patch, input: Patch) -> tuple[Patch, Patch]:
         """Return the masked image's window, then the other's."""

@@ -12,7 +12,7 @@ from ..geometry.fitting import fit_model
 from ..geometry.limits import SearchLimits
 from ..geometry.models import shift_model
 from ..geometry.transform import Transform
-from ..matching.chips import MaskOf
+from ..matching.matcher import MaskOf
 from ..rasters.grid import FloatArray, Grid, apply_affine, compose
 from ..rasters.pair import Image, require_content, require_georeferenced_alike
 from ..rasters.patch import Patch
@@ -138,23 +138,15 @@ def read_windows(
     around = np.minimum(np.maximum(nominal_high - centre, centre - nominal_low), needed)
     longest = 2 * max(half.max(), around.max() / np.sqrt(scale[0] * scale[1]))
     pixel = max(own.pixel_size_m, nominal.input_grid.pixel_size_m, longest / LONGEST_PX)
-    grids = [_grid(frame, own, centre, size, pixel) for size in (half, around)]
+    first, second = (_grid(frame, own, centre, size, pixel) for size in (half, around))
     # Both windows grow by incomplete pixels on all sides, so that their centres still coincide.
-    hidden = None if held_out is None else held_out(grids[0])
-
-    def of_reference(image: Image) -> Patch:
-        return image.read_onto(grids[0], own.map_to_pixel, hidden)
-
-    def of_input(image: Image) -> Patch:
-        return image.read_onto(grids[1], nominal)
-
-    windows = PoseWindows(
-        of_reference(reference), of_input(input), grids[0], grids[1], nominal, radius
-    )
+    hidden = None if held_out is None else held_out(first)
+    of_reference, of_input = (first, own.map_to_pixel, hidden), (second, nominal)
+    patches = reference.read_onto(*of_reference), input.read_onto(*of_input)
     where = "where the images are compared"
-    require_content(reference, windows.reference, of_reference, where)
-    require_content(input, windows.input, of_input, where)
-    return windows
+    require_content(reference, patches[0], where, *of_reference)
+    require_content(input, patches[1], where, *of_input)
+    return PoseWindows(*patches, first, second, nominal, radius)
 
 
 def _nominal(reference: Image, input: Image) -> Transform:

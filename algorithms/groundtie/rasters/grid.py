@@ -184,8 +184,7 @@ class Grid:
     @cached_property
     def pixel_size_m(self) -> float:
         """Side of a square with a pixel's area, in metres (in pixels without georeferencing)."""
-        t = self.transform
-        area = abs(t.a * t.e - t.b * t.d) * self.metres_per_unit[0] * self.metres_per_unit[1]
+        area = abs(self.transform.determinant) * self.metres_per_unit[0] * self.metres_per_unit[1]
         return float(np.sqrt(area))
 
     @cached_property

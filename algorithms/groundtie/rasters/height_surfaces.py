@@ -224,15 +224,10 @@ def surface_around(
     values, valid = read_heights(source, window, None if reduce == 1 else shape)
     if not valid.any():
         raise RasterContentError(f"{source.path} holds no heights in the area of the image")
-    amid, filled = valid | _are_enclosed(valid), fill_voids(values, valid)
+    from scipy.ndimage import binary_fill_holes  # takes long to import
+
+    amid, filled = binary_fill_holes(valid), fill_voids(values, valid)
     return RasterSurface(source, to_px, window, filled, valid, amid, fills_open=fill_open)
-
-
-def _are_enclosed(valid: Mask) -> Mask:
-    """Return which pixels, (h, w), lie in voids that do not reach the edge."""
-    _, labels = cv2.connectedComponents((~valid).astype(np.uint8), connectivity=4)
-    at_edge = np.unique(np.concatenate([*labels[[0, -1]], *labels[:, [0, -1]].T]))
-    return ~np.isin(labels, [0, *at_edge])
 
 
 def fill_voids(values: FloatImage, valid: Mask) -> FloatImage:

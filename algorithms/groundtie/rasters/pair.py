@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,21 +130,30 @@ class Image:
         return sample_bands(self.source, grid, to_px)[0]
 
 
-def require_content(image: Image, patch: Patch, read: Callable[[Image], Patch], where: str) -> None:
+def require_content(
+    image: Image,
+    patch: Patch,
+    where: str,
+    grid: Grid,
+    to_px: PointFunction,
+    hidden: Mask | None = None,
+) -> None:
     """Raise `RasterContentError` if a piece of an image has no content, and say if a mask hides it.
 
     Parameters
     ----------
     image, patch
         The image, and the piece.
-    read
-        Reads the same piece of an image; called with this image without its mask.
     where
         Name of the piece in messages.
+    grid, to_px, hidden
+        As `Image.read_onto` read the piece.
     """
     if not patch.is_flat:
         return
-    unmasked = patch if image.mask is None else read(replace(image, mask=None))
+    unmasked = patch
+    if image.mask is not None:
+        unmasked = replace(image, mask=None).read_onto(grid, to_px, hidden)
     name = image.source.path
     if patch.valid.any():
         shown = name if unmasked.is_flat else f"what its mask leaves of {name}"

@@ -126,7 +126,7 @@ def _slopes(heights_m: FloatImage, grid: Grid) -> tuple[FloatImage, FloatImage]:
     along = (heights_m[1:-1, 2:] - heights_m[1:-1, :-2]) / 2
     down = (heights_m[2:, 1:-1] - heights_m[:-2, 1:-1]) / 2
     t = grid.transform
-    determinant = t.a * t.e - t.b * t.d
+    determinant = t.determinant
     x, y = (along * t.e - down * t.d) / determinant, (down * t.a - along * t.b) / determinant
     east, north = (x * step[0] + y * step[1] for step in grid.east_north)
     return east.astype(np.float32), north.astype(np.float32)

@@ -111,8 +111,8 @@ def ground_instead(
     """
     if scene.has_user_mask:
         return None
-    if scene.open_ground is not None:
-        select = scene.open_ground.select
+    if scene.sensors is Sensors.RADARS:
+        select = scene.reference.open_ground.select
         image, share = with_mask(pair, REFERENCE, scene.reference.scene, select, stack, context)
         reason = "what has texture over a wide area is forest or settlement"
         used = MaskUsed(OPEN, REFERENCE, share, reason, elevated_px=_OPEN_PX)

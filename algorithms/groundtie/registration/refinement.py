@@ -310,7 +310,7 @@ class RefinedRpc:
         return [
             *self.tried,
             f"accepted: {verdict.reason}",
-            f"model: {bias.kind}, {verdict.fit_points_used} of {verdict.fit_points} points",
+            verdict.model_line(bias.kind),
             f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
             f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
             f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "

@@ -47,7 +47,7 @@ from .registered_output import (
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
-from .verdict import NOT_JUDGED, Verdict, both_units
+from .verdict import NOT_JUDGED, Verdict
 
 _LOG = logging.getLogger(__name__)
 
@@ -305,14 +305,13 @@ class Registration:
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         v, transform, correction = self.verdict, self.transform, self.correction
-        word = "accepted" if v.accepted else "refused"
-        lines = [*self.tried, f"{word}: {v.sentence()}"]
+        lines = [*self.tried, f"{v.word}: {v.sentence()}"]
         if correction is not None:
             lines.insert(0, f"correction: {correction.text()}")
         if v.accepted and transform is not None:
             lines += [
-                f"model: {transform.model.kind}, {v.fit_points_used} of {v.fit_points} points",
-                f"error at check points: RMSE {both_units(v.check_rmse_px, v.check_rmse_m)}",
+                v.model_line(transform.model.kind),
+                v.error_line(),
                 v.accuracy_line(),
                 f"check points that agree: {v.check_points_agreeing} of {v.check_points}; by "
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
@@ -327,8 +326,7 @@ class Registration:
 
     def __repr__(self) -> str:
         # The default would show all fields, which hold arrays and open rasters.
-        word = "accepted" if self.verdict.accepted else "refused"
-        return f"<{type(self).__name__} {word}: {self.verdict.reason}>"
+        return f"<{type(self).__name__} {self.verdict.word}: {self.verdict.reason}>"
 
     def close(self) -> None:
         """Close the rasters; results stay available."""

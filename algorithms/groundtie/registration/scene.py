@@ -220,11 +220,6 @@ class SceneInfo:
         is_rough = self.radar.variation2 >= _LEAST_BENEATH_LAYER * LEAST_VARIATION2
         return self.apparent is Sensors.DIFFERENT or (is_rough and self._is_far_rougher)
 
-    @property
-    def open_ground(self) -> OpenGround | None:
-        """The open ground of the reference; None: the images are not two radars'."""
-        return self.reference.open_ground if self.sensors is Sensors.RADARS else None
-
     def kinds_by(self, model: Model) -> ImageKinds:
         """Return what surveys of a model on the map need to know of the images."""
         is_input_radar = self.sensors is Sensors.DIFFERENT and self.radar_name == INPUT

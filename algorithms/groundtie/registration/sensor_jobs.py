@@ -24,7 +24,7 @@ from .refinement import RefinedRpc
 from .refinement_output import RefinementFiles, require_place
 from .sensor_input import Ground, OrientedImage, open_oriented_image
 from .specification import Specification
-from .verdict import Verdict, both_units
+from .verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,11 @@ class GcpResult:
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         points, verdict = self.points, self.verdict
-        error = both_units(verdict.check_rmse_px, verdict.check_rmse_m)
         return [
             f"accepted: {verdict.reason}",
             f"{int(points.fit.sum())} of {int((~points.is_check).sum())} "
             f"points, and {int(points.check.sum())} check points",
-            f"error at check points: RMSE {error}",
+            verdict.error_line(),
             *coverage_lines(self.survey),
             self.heights,
             self.mask.line(),

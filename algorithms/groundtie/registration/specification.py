@@ -107,7 +107,7 @@ class Specification:
     model
         One of `models.KINDS`, or "auto" for the simplest polynomial that the points justify.
     candidates
-        The models that "auto" chooses from, from simple to flexible.
+        The models that "auto" chooses from with the matcher "chips", from simple to flexible.
     max_error_px
         Largest root mean square error at check points, in pixels of the coarser image, or of
         `matching_pixel_size_m` if that is stated.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from ..context import Context
 from ..features.descriptors import SiftDescriptor
@@ -37,12 +36,7 @@ from .opening import open_terrain
 from .specification import CHIPS, KEYPOINTS, Specification
 from .surface_masks import ModelFit, fit_of, fit_of_images
 
-
-class Fitter(Protocol):
-    """Finds tie points near a coarse model, blind to held-out blocks, and fits a model."""
-
-    def estimate(self, coarse: Model, kind: str, context: Context) -> Estimate:
-        """Return the model that tie points agree on; `TooFewPointsError` if none do."""
+Fit = SurfaceFit | KeypointFit | GuidedFit
 
 
 @dataclass(frozen=True)
@@ -62,7 +56,7 @@ class Stages:
     matcher
         Matches check chips, chips of a `SurfaceFit` and, on reduced images, the coarse shift.
     fit
-        Fits the model.
+        Finds tie points near a coarse model, blind to the held-out blocks, and fits a model.
     """
 
     images: ImagePair
@@ -70,7 +64,7 @@ class Stages:
     spec: Specification
     held_out: HeldOut
     matcher: SurfaceMatcher
-    fit: Fitter
+    fit: Fit
 
     @classmethod
     def of(cls, images: ImagePair, masked: Masked, spec: Specification) -> Stages:
@@ -185,8 +179,8 @@ def _fit(
     matcher: SurfaceMatcher,
     held_out: HeldOut,
     spec: Specification,
-) -> Fitter:
-    """Return the fitter for the specification's matcher."""
+) -> Fit:
+    """Return the fit for the specification's matcher."""
     layout = held_out.layout
     if spec.matcher == CHIPS:
         terrain = None if spec.dem is None else open_terrain(pair, spec.dem, spec.input_dem)

@@ -83,6 +83,20 @@ class Verdict:
         """Return the reason and, of a refusal, what to try."""
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
+    @property
+    def word(self) -> str:
+        """The verdict in a word."""
+        return "accepted" if self.accepted else "refused"
+
+    def model_line(self, kind: str) -> str:
+        """Return the kind of model and how many points it fits, as a line of text."""
+        return f"model: {kind}, {self.fit_points_used} of {self.fit_points} points"
+
+    def error_line(self) -> str:
+        """Return the error at check points as a line of text."""
+        error = both_units(self.check_rmse_px, self.check_rmse_m)
+        return f"error at check points: RMSE {error}"
+
     def accuracy_line(self) -> str:
         """Return the predicted error at a random place, with its interval, as a line of text."""
         (low, high), ellipse = self.accuracy.ce90_range_px, self.accuracy.ellipse

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .frame import PARAMETERS, FloatArray, SeriesFrame, rms_px, sigma_px
+from ..rasters.grid import FloatArray
+from .frame import PARAMETERS, SeriesFrame, rms_px, sigma_px
 from .network import Link, largest_statistic
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from shapely.geometry import LineString, mapping
 
 from ..context import Context
 from ..errors import NoOverlapError, NotRegisteredError
@@ -22,7 +21,7 @@ from ..registration.verdict import Verdict
 from ..report.stac import stac_item
 from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
-from .frame import FloatArray, sigma_px
+from .frame import sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import SERIES_JSON, StoredDate, StoredSeries, forget_unfinished, state_of
 
@@ -196,9 +195,8 @@ def _write_layer(path: Path, series: Series) -> None:
 def _outline(one: SeriesDate) -> Mapping[str, Any] | None:
     if one.transform is None:
         return None
-    around: FloatArray = one.transform.inverse(one.transform.input_grid.outline(1))
-    found: Mapping[str, Any] = mapping(LineString([*around, around[0]]))
-    return found
+    around = one.transform.inverse(one.transform.input_grid.outline(1)).tolist()
+    return {"type": "LineString", "coordinates": [*around, around[0]]}
 
 
 def _refusal(series: Series) -> NotRegisteredError:

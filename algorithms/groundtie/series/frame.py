@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,7 @@ import numpy as np
 from affine import Affine
 
 from ..geometry.models import Frame, PolynomialModel, monomials
-from ..rasters.grid import FloatArray, Grid, compose, mesh, reproject
-
-Move = Callable[[FloatArray], FloatArray]
+from ..rasters.grid import FloatArray, Grid, PointFunction, compose, mesh, reproject
 
 # Parameters of a displacement: the shift, and its change along either axis, (x, y) each.
 PARAMETERS = 6
@@ -93,7 +91,7 @@ class SeriesFrame:
         moved = Affine.translation(*self.centre_px)
         return Frame(compose(self.grid.centre_transform, moved, scale))
 
-    def displacement_of(self, move: Move) -> FloatArray:
+    def displacement_of(self, move: PointFunction) -> FloatArray:
         """Return the least-squares displacement, (6,), of a move of map positions."""
         side = np.linspace(-1, 1, _SAMPLES)
         uv, square = mesh(side, side), self.square

@@ -18,8 +18,9 @@ from scipy.sparse.linalg import splu
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 
 from ..geometry.judging import SIGNIFICANCE
+from ..rasters.grid import FloatArray
 from ..rasters.reading import Mask
-from .frame import PARAMETERS, ROUNDING_PX, FloatArray, SeriesFrame, sigma_px
+from .frame import PARAMETERS, ROUNDING_PX, SeriesFrame, sigma_px
 
 # Largest offset of dates from each other, in pixels.
 _GOAL_PX = 0.3

@@ -23,10 +23,9 @@ from ..errors import (
 from ..executors import enter_worker
 from ..geometry.estimation import jackknife_deviations
 from ..geometry.models import Model
-from ..kinds import AUTO
 from ..matching.alignment import LINEAR_CANDIDATES
 from ..memory import bounded_cache
-from ..rasters.grid import Grid, reproject
+from ..rasters.grid import FloatArray, Grid, reproject
 from ..registration.opening import pair_images
 from ..registration.pipeline import run
 from ..registration.registration import Registration
@@ -34,7 +33,7 @@ from ..registration.specification import COREGISTER, SAR_SAR, Specification
 from ..runs import digest
 from ..version import __version__
 from .dates import Date, open_dates
-from .frame import PARAMETERS, FloatArray, SeriesFrame
+from .frame import PARAMETERS, SeriesFrame
 from .inputs import Listed
 from .network import Link
 
@@ -73,14 +72,12 @@ class Settings:
 
     def specification(self, first: Date, second: Date) -> Specification:
         """Return the specification of a pair, by the kinds of the two images."""
-        preset, model = COREGISTER, self.model
+        preset = COREGISTER
         if first.is_radar == second.is_radar:
             preset = SAR_SAR if first.is_radar else _CAMERAS
-        if preset is SAR_SAR and model == AUTO:
-            model = "affine"  # keypoints choose among bent models, too
         return replace(
             preset,
-            model=model,
+            model=self.model,
             candidates=LINEAR_CANDIDATES,
             max_error_px=self.max_error_px,
             search_radius_m=self.search_radius_m,

@@ -14,9 +14,10 @@ from ..errors import WorkerLostError
 from ..executors import POLL_SECONDS, result_of
 from ..memo import Memo
 from ..memory import DESCRIBED_SHARE, share_bytes
+from ..rasters.grid import FloatArray
 from .closure import triplet_closures
 from .dates import Date
-from .frame import PARAMETERS, FloatArray, SeriesFrame
+from .frame import PARAMETERS, SeriesFrame
 from .network import Link, adjust
 from .pairs import PairResult, PairTask, Settings, pair_key, register_pair
 

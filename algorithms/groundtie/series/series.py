@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ..declaration import file_lines, given_files
 from ..geometry.transform import Transform
 from ..kinds import plain
-from ..rasters.grid import Grid
+from ..rasters.grid import FloatArray, Grid
 from ..registration.registered_output import BeyondOverlap
 from ..report.page import made
 from .dates import Date
-from .frame import FloatArray, SeriesFrame, rms_px, sigma_px
+from .frame import SeriesFrame, rms_px, sigma_px
 from .inputs import Listed
 from .pairs import PairResult
 from .settling import DateVerdict, Settled

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ..rasters.grid import FloatArray
 from ..registration.evidence import DateEvidence
 from ..registration.verdict import Verdict, decide
 from .closure import Closure, triplet_closures
-from .frame import FloatArray, SeriesFrame
+from .frame import SeriesFrame
 from .network import Adjustment, Link, adjust
 from .pairs import PairResult
 

@@ -213,10 +213,6 @@ class Sameness:
         return self.ground >= _GROUND_SHARE and not self.is_finer_than_ground
 
 
-_NO_WINDOWS = np.zeros((4, 3), int)
-_NO_EDGES = np.zeros((len(_OFFSETS), 2, len(_NEAR_PX) - 1), int)
-
-
 @dataclass(frozen=True)
 class Look:
     """Counts of one window.
@@ -257,14 +253,14 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
     Parameters
     ----------
     looks
-        Counts of the windows.
+        Counts of the windows, of one at least.
     steps
         Their `step_products`, from the input without resampling where possible.
     """
-    edges = np.sum([one.edges for one in looks], axis=0) if looks else _NO_EDGES
+    edges = np.sum([one.edges for one in looks], axis=0)
     sharp, blurred, *_ = edges.sum(axis=1).T
     _, to_half, *beside = edges[0].T
-    windows = np.sum([one.windows for one in looks], axis=0) if looks else _NO_WINDOWS
+    windows = np.sum([one.windows for one in looks], axis=0)
     every = windows[:, 2]
     area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
     # Of the images and of reduced ones.
@@ -276,7 +272,7 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         float(coarse_area),
         ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
         related=float(related),
-        step_width=step_width(np.sum(steps, axis=0)) if steps else np.inf,
+        step_width=step_width(np.sum(steps, axis=0)),
         beside=max(
             _more_of(to_half) / _most_of(sharp),
             *(_more_of(some) / _most_of(sharp + blurred) for some in beside),

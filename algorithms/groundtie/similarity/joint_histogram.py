@@ -23,10 +23,9 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..rasters.kernels import bspline_weights
+from ..rasters.reading import FloatImage
 from .correlation import from_spectrum, spans, spectrum, tight_shape
 from .stacks import each
-
-FloatArray = NDArray[np.float32]
 
 # The cubic B-spline is the first without interpolation artefacts.
 ORDER = 4
@@ -45,7 +44,7 @@ def reach(order: int = ORDER) -> int:
     return (order - 1) // 2
 
 
-def gpve_histograms(counts: FloatArray, order: int = ORDER) -> FloatArray:
+def gpve_histograms(counts: FloatImage, order: int = ORDER) -> FloatImage:
     """Return the GPVE histograms at all integer shifts at which the kernel lies inside the counts.
 
     Parameters
@@ -71,11 +70,11 @@ def gpve_histograms(counts: FloatArray, order: int = ORDER) -> FloatArray:
     return np.moveaxis(made, (-4, -3), (-2, -1))
 
 
-def _convolve(planes: FloatArray, weights: FloatArray, span: int, axis: int) -> FloatArray:
+def _convolve(planes: FloatImage, weights: FloatImage, span: int, axis: int) -> FloatImage:
     """Correlate along an axis with a short kernel; the axis loses the kernel's ends."""
     along = planes.swapaxes(axis, -1)
     parts = (along[..., k : k + span] for k in range(len(weights)))
-    found: FloatArray = functools.reduce(operator.iadd, map(np.multiply, parts, weights))
+    found: FloatImage = functools.reduce(operator.iadd, map(np.multiply, parts, weights))
     return found.swapaxes(axis, -1)
 
 
@@ -84,7 +83,7 @@ def count_joint_histograms(
     search: NDArray[np.uint8],
     bins: tuple[int, int],
     context: Context | None = None,
-) -> FloatArray:
+) -> FloatImage:
     """Count the joint histograms of a template at all integer shifts in its search window.
 
     Parameters
@@ -125,14 +124,14 @@ def _count_directly(
     search: NDArray[np.uint8],
     bins: tuple[int, int],
     context: Context | None,
-) -> FloatArray:
+) -> FloatImage:
     """Count shift by shift."""
     height, width = template.shape[-2:]
     rows, cols = spans(template, search)
     sizes = [n + 1 for n in bins]
     ranges = [0, sizes[0], 0, sizes[1]]
 
-    def of_one(template: NDArray[np.uint8], search: NDArray[np.uint8]) -> FloatArray:
+    def of_one(template: NDArray[np.uint8], search: NDArray[np.uint8]) -> FloatImage:
         counts = np.empty((rows, cols, *bins), np.float32)
 
         def count_row(dy: int) -> None:
@@ -150,7 +149,7 @@ def _count_directly(
 
 def _count_spectrally(
     template: NDArray[np.uint8], search: NDArray[np.uint8], bins: tuple[int, int], workers: int
-) -> FloatArray:
+) -> FloatImage:
     """Count all shifts at once by correlating the planes of all bins with each other.
 
     Counts are whole numbers. Several bins of the search window, weighted by powers of 2, therefore
@@ -218,7 +217,7 @@ class _Digits:
         weights[bin // self.count, bin] = 2.0 ** (self.bits * (bin % self.count))
         return weights
 
-    def read(self, planes: NDArray[np.floating], counts: FloatArray) -> None:
+    def read(self, planes: NDArray[np.floating], counts: FloatImage) -> None:
         """Write the counts in planes, (…, planes, ny, nx), to `counts`, (…, bins, ny, nx)."""
         whole = np.rint(planes).astype(np.int32 if self.dtype is np.float32 else np.int64)
         for digit in range(self.count):

@@ -1,9 +1,9 @@
 """Measures of similarity: functions of two windows that return surfaces over shifts.
 
-To add a measure, write its function in this file below `@measure("its-name")`, and its test. Every
-tool with a choice of similarity then offers it, and `similarity_surface` shows it. A measure of
-joint histograms is one line: `measure("name")(of_histograms(function))`. Measures that only serve
-for comparison are in `studies.measures`.
+To add a measure, write its function in this file, a line in `MEASURES`, and its test. Every tool
+with a choice of similarity then offers it, and `similarity_surface` shows it. `of_histograms` makes
+a measure of a function of joint histograms. Measures that only serve for comparison are in
+`studies.measures`.
 """
 
 from __future__ import annotations
@@ -33,23 +33,11 @@ HistogramMeasure = Callable[[Histograms], FloatArray]
 # (…, 2 radius + 1, 2 radius + 1), or several such surfaces of equal weight, shape (n, …).
 Measure = Callable[[Description, Description, Context | None], FloatArray]
 
-MEASURES: dict[str, Measure] = {}
-
 # Lanes and block length with which numpy sums along contiguous memory.
 _LANES, _PAIRWISE_BLOCK = 8, 128
 
 # Entropies below this hold rounding only.
 _NOTHING = 1e-9
-
-
-def measure(name: str) -> Callable[[Measure], Measure]:
-    """Register a measure under a name by which users choose it."""
-
-    def register(function: Measure) -> Measure:
-        MEASURES[name] = function
-        return function
-
-    return register
 
 
 def of_histograms(function: HistogramMeasure) -> Measure:
@@ -70,10 +58,9 @@ def normalized_mutual_information(histograms: Histograms) -> FloatArray:
     return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
 
 
-nmi = measure("nmi")(of_histograms(normalized_mutual_information))
+nmi = of_histograms(normalized_mutual_information)
 
 
-@measure("orientation")
 def orientation(
     template: Description, search: Description, context: Context | None = None
 ) -> FloatArray:
@@ -83,7 +70,6 @@ def orientation(
     return correlate_fields(template.fields, search.fields, *valid, workers)
 
 
-@measure("edge-strength")
 def strength(
     template: Description, search: Description, context: Context | None = None
 ) -> FloatArray:
@@ -91,10 +77,18 @@ def strength(
     return correlate_grey(template.strength, search.strength)
 
 
-@measure("ncc")
 def ncc(template: Description, search: Description, context: Context | None = None) -> FloatArray:
     """Return the correlation of grey values."""
     return correlate_grey(template.patch, search.patch)
+
+
+# By the names by which users choose them.
+MEASURES: dict[str, Measure] = {
+    "nmi": nmi,
+    "orientation": orientation,
+    "edge-strength": strength,
+    "ncc": ncc,
+}
 
 
 def tables(histograms: Histograms) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from ..rasters.colours import levels
 from ..rasters.patch import Patch
+from ..rasters.reading import FloatImage
 from .binning import bin_edges
 from .correlation import fast_shape, from_spectrum, spans, spectrum
 from .stacks import each
 from .surface import Surface
-
-FloatArray = NDArray[np.float32]
 
 BINS = 12
 
@@ -48,13 +47,13 @@ class PooledHistogram:
         shape (bins, bins).
     """
 
-    template_edges: FloatArray
-    search_edges: FloatArray
-    information: FloatArray
+    template_edges: FloatImage
+    search_edges: FloatImage
+    information: FloatImage
 
     @classmethod
     def of(
-        cls, template: FloatArray, search: FloatArray, search_edges: FloatArray | None = None
+        cls, template: FloatImage, search: FloatImage, search_edges: FloatImage | None = None
     ) -> PooledHistogram:
         """Return the pointwise mutual information by a sample of pairs.
 
@@ -112,7 +111,7 @@ def smooth(patch: Patch) -> Patch:
     """
     counts = patch.valid.astype(np.float32)
 
-    def mean(image: FloatArray) -> FloatArray:
+    def mean(image: FloatImage) -> FloatImage:
         return np.asarray(cv2.blur(image, (_SMOOTH_PX, _SMOOTH_PX)), np.float32)
 
     signed = patch.values * np.abs(patch.values) * counts

@@ -111,7 +111,6 @@ class Canvas:
     def __post_init__(self) -> None:
         """Start with nothing drawn."""
         self.labels: Labels = np.zeros(self.shape, np.int32)
-        self._cover_of: list[Cover] = []
         self._things: list[Standing | Tree] = []
         self._trees: list[Point] = []
 
@@ -163,7 +162,7 @@ class Canvas:
     ) -> None:
         """Add trees at the drawn positions, with crown radii of `crown_m` to 4 m."""
         parcels = [
-            self._add(Cover.FOREST, self.generator.uniform(4, highest_m)) for _ in range(kinds)
+            self.book.add(Cover.FOREST, self.generator.uniform(4, highest_m)) for _ in range(kinds)
         ]
         for place in self._trees:
             kind, size = self.generator.random(2).tolist()
@@ -203,12 +202,6 @@ class Canvas:
         x, y = centre[0] + reach * np.cos(turn), centre[1] + 0.8 * reach * np.sin(turn)
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
-    def _add(
-        self, cover: Cover, height_m: float = 0.0, rows_rad: float = 0.0, window_m: float = 0.0
-    ) -> int:
-        self._cover_of.append(cover)
-        return self.book.add(cover, height_m, rows_rad, window_m)
-
     def _touches_scene(self, polygon: Polygon) -> bool:
         height, width = self.labels.shape
         x, y = zip(*polygon, strict=True)
@@ -218,7 +211,7 @@ class Canvas:
         height, width = self.labels.shape
         column = min(max(round(point[0]), 0), width - 1)
         row = min(max(round(point[1]), 0), height - 1)
-        return self._cover_of[self.labels[row, column]]
+        return self.book.cover(self.labels[row, column])
 
     def _fill(self, polygon: Polygon, label: int, *, convex: bool = True) -> None:
         corners = np.rint(np.array(polygon) * (1 << _SUBPIXEL_BITS)).astype(np.int32)

@@ -71,7 +71,7 @@ class CityLayout(Canvas):
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole city; see `Canvas.images`."""
-        self.labels[:] = self._add(Cover.PAVEMENT)
+        self.labels[:] = self.book.add(Cover.PAVEMENT)
         outline = self._rotated_outline()
         boulevard = self.generator.uniform(*_BOULEVARD_M) * self.px_per_m
         parts = subdivide(outline, _DISTRICT_M2 * self.px_per_m**2, boulevard, self.generator)
@@ -105,20 +105,20 @@ class CityLayout(Canvas):
 
     def _draw_open_block(self, block: Polygon) -> None:
         park = self.generator.random() < 0.6
-        self._fill(block, self._add(Cover.GRASS if park else Cover.PAVEMENT))
+        self._fill(block, self.book.add(Cover.GRASS if park else Cover.PAVEMENT))
         self._scatter_over(block, 1 / 300 if park else 1 / 1500)
 
     def _draw_block(self, block: Polygon, quarter: Quarter) -> None:
         green = self.generator.random() < 0.3
-        self._fill(block, self._add(Cover.GRASS if green else quarter.ground))
+        self._fill(block, self.book.add(Cover.GRASS if green else quarter.ground))
         self._buildings += quarter.build(block, self.px_per_m, self.generator)
         self._scatter_over(block, quarter.trees_per_m2)
 
     def _draw_streets(self, streets: list[_Street]) -> None:
         """Draw pavements before carriageways, so that no pavement crosses a junction."""
         for street in streets:
-            self._fill(street.lane, self._add(Cover.PAVEMENT))
-        asphalt = [self._add(Cover.ASPHALT) for _ in range(_KINDS)]
+            self._fill(street.lane, self.book.add(Cover.PAVEMENT))
+        asphalt = [self.book.add(Cover.ASPHALT) for _ in range(_KINDS)]
         for number, street in enumerate(streets):
             self._fill(street.carriageway(_KERB_M * self.px_per_m), asphalt[number % _KINDS])
             if street.trees:
@@ -129,8 +129,8 @@ class CityLayout(Canvas):
     def _draw_river(self) -> None:
         if self.generator.random() < _RIVER_CHANCE:
             quay, water = self._river((14, 28), 8)
-            self._fill(quay, self._add(Cover.PAVEMENT), convex=False)
-            self._fill(water, self._add(Cover.WATER), convex=False)
+            self._fill(quay, self.book.add(Cover.PAVEMENT), convex=False)
+            self._fill(water, self.book.add(Cover.WATER), convex=False)
 
     def _draw_railway(self) -> list[Standing]:
         """Draw the tracks and return the trains."""
@@ -142,8 +142,8 @@ class CityLayout(Canvas):
         aside = self.generator.uniform(-0.35, 0.35) * min(height, width)
         centre = moved((width / 2, height / 2), 0.0, aside, angle)
         tracks = rectangle(centre, (math.hypot(height, width), half_width), angle)
-        self._fill(tracks, self._add(Cover.RAIL, rows_rad=angle + math.pi / 2))
-        coach = self._add(Cover.CAR, 4.0)
+        self._fill(tracks, self.book.add(Cover.RAIL, rows_rad=angle + math.pi / 2))
+        coach = self.book.add(Cover.CAR, 4.0)
         trains = []
         for when in Acquisition:
             for _ in range(_TRAINS):
@@ -163,14 +163,14 @@ class CityLayout(Canvas):
             when = self.changes.draw()
             window_m = self.generator.uniform(*_WINDOW_M)
             for part, height_m in building.parts:
-                roof = self._add(Cover.BUILDING, height_m, window_m=window_m)
+                roof = self.book.add(Cover.BUILDING, height_m, window_m=window_m)
                 self._things.append(Standing(part, roof, when))
 
     def _park_cars(self, streets: list[_Street]) -> None:
         """Add cars along the kerbs and on the lanes, different ones at each acquisition."""
         if self.px_per_m * _CAR_M[1] < 1:
             return
-        kinds = [self._add(Cover.CAR, 1.5) for _ in range(_KINDS)]
+        kinds = [self.book.add(Cover.CAR, 1.5) for _ in range(_KINDS)]
         # Filling includes all touched pixels: outlines are reduced by 0.4 px on all sides.
         half_car = (_CAR_M[0] / 2 * self.px_per_m - 0.4, _CAR_M[1] / 2 * self.px_per_m - 0.4)
         for street in streets:

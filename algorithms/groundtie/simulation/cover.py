@@ -148,6 +148,10 @@ class ParcelBook:
         self._rows.append((int(cover), height_m, decibels, spectrum, rows_rad, window_m, wall))
         return len(self._rows) - 1
 
+    def cover(self, number: int) -> Cover:
+        """Return the class of a parcel."""
+        return Cover(self._rows[number][0])
+
     def table(self) -> ParcelTable:
         """Return all parcels added so far."""
         cover, *numbers = zip(*self._rows, strict=True)

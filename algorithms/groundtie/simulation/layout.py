@@ -82,7 +82,7 @@ class Layout(Canvas):
 
     def draw(self) -> tuple[Labels, Labels]:
         """Draw the whole scene; see `Canvas.images`."""
-        self.labels[:] = self._add(Cover.GRASS)
+        self.labels[:] = self.book.add(Cover.GRASS)
         outline = self._rotated_outline()
         arterial = _ARTERIAL_M[self.density] * self.px_per_m
         districts = subdivide(outline, _DISTRICT_M2 * self.px_per_m**2, arterial, self.generator)
@@ -91,7 +91,7 @@ class Layout(Canvas):
                 self._draw_district(district)
         self._draw_waters()
         for lane in districts.lanes:
-            self._fill(lane, self._add(Cover.ROAD))
+            self._fill(lane, self.book.add(Cover.ROAD))
         self._draw_buildings()
         self._plant_trees(8, 12, 1.5, (Cover.WATER, Cover.ROAD, Cover.BUILDING))
         return self.images()
@@ -102,7 +102,7 @@ class Layout(Canvas):
         blocks = subdivide(
             district, use.block_m2 * self.px_per_m**2, use.street_m * self.px_per_m, self.generator
         )
-        street = self._add(Cover.ROAD)
+        street = self.book.add(Cover.ROAD)
         for lane in blocks.lanes:
             self._fill(lane, street)
         for block in blocks.cells:
@@ -116,19 +116,19 @@ class Layout(Canvas):
     def _draw_open_block(self, block: Polygon, use: Use) -> None:
         _, half, angle = main_frame(block)
         if use is FOREST:
-            self._fill(block, self._add(Cover.FOREST, self.generator.uniform(*CANOPY_M)))
+            self._fill(block, self.book.add(Cover.FOREST, self.generator.uniform(*CANOPY_M)))
         elif use is PARK:
-            self._fill(block, self._add(Cover.GRASS))
+            self._fill(block, self.book.add(Cover.GRASS))
             self._scatter_trees(block, half[0] * half[1] / (120 * self.px_per_m**2))
         else:
-            self._fill(block, self._add(Cover.FIELD, rows_rad=angle + math.pi / 2))
+            self._fill(block, self.book.add(Cover.FIELD, rows_rad=angle + math.pi / 2))
 
     def _draw_lots(self, block: Polygon, use: Use) -> None:
         ground = Cover.PAVEMENT if use is DENSE else Cover.GRASS
-        self._fill(block, self._add(ground))
+        self._fill(block, self.book.add(ground))
         for lot in subdivide(block, use.lot_m2 * self.px_per_m**2, 0.0, self.generator).cells:
             if ground is Cover.GRASS:
-                self._fill(lot, self._add(Cover.GRASS))
+                self._fill(lot, self.book.add(Cover.GRASS))
             fill = (self.generator.uniform(*use.fill), self.generator.uniform(*use.fill))
             footprint = fitted_rectangle(lot, fill)
             if footprint is not None:
@@ -160,12 +160,12 @@ class Layout(Canvas):
             radius = self.generator.uniform(20, 70) * self.px_per_m
             shores.append((self._blob(centre, radius * 1.15), self._blob(centre, radius)))
         for bank, _ in shores:
-            self._fill(bank, self._add(Cover.GRASS), convex=False)
+            self._fill(bank, self.book.add(Cover.GRASS), convex=False)
         for _, water in shores:
-            self._fill(water, self._add(Cover.WATER), convex=False)
+            self._fill(water, self.book.add(Cover.WATER), convex=False)
 
     def _draw_buildings(self) -> None:
         for footprint, height_m in self._buildings:
             if not self._touches(footprint, (Cover.WATER,)):
-                building = self._add(Cover.BUILDING, height_m)
+                building = self.book.add(Cover.BUILDING, height_m)
                 self._things.append(Standing(footprint, building, self.changes.draw()))

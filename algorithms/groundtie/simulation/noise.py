@@ -9,6 +9,8 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
+from ..rasters.kernels import bspline_weights
+
 STRIP_ROWS = 256
 
 
@@ -87,14 +89,7 @@ class SmoothNoise:
 
 def _spline_taps(
     position: npt.NDArray[np.float64],
-) -> tuple[npt.NDArray[np.intp], list[npt.NDArray[np.float32]]]:
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.float32]]:
     """Return the first lattice node and the four cubic B-spline weights of each position."""
     node = np.floor(position).astype(np.intp)
-    f = position - node
-    weights = [
-        (1 - f) ** 3 / 6,
-        (3 * f**3 - 6 * f**2 + 4) / 6,
-        (-3 * f**3 + 3 * f**2 + 3 * f + 1) / 6,
-        f**3 / 6,
-    ]
-    return node, [w.astype(np.float32) for w in weights]
+    return node, bspline_weights(4, position - node).astype(np.float32)

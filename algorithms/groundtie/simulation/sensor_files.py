@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..rasters.atomic import Outputs, make_folder, write_json, writing
-from ..rasters.grid import PIXEL_COORDINATES, Grid
 from ..rasters.writing import write_raster
 from ..sensor.rpc_files import write_rpc
 from ..sensor.rpc_tags import rpc_to_tags
@@ -56,7 +55,7 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
     make_folder(Path(folder))
     bands = [band.capitalize() for band in made.options.optical.bands]
     rpc_tags = rpc_to_tags(made.delivered.rpc)
-    own = Grid(PIXEL_COORDINATES, None, made.image.shape[2], made.image.shape[1])
+    own = made.reference_grid.on_own_pixels()
     with Outputs() as outputs, writing(folder):
         staged = {key: outputs.stage(path) for key, path in paths.items()}
         write_raster(staged["reference"], made.reference[None], made.reference_grid, ["Amplitude"])

@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import ParameterError
 from ..progress import SILENT, Progress
-from ..rasters.grid import LON_LAT, PIXEL_COORDINATES, FloatArray, Grid, mesh, reproject
+from ..rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
 from ..sensor.rpc import image_places
 from ..sensor.rpc_fit import HEIGHTS, RPCFit, fit_rpc
 from .attitude import AttitudeError, AttitudeOptions
@@ -179,7 +179,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     exact, delivered = _rpcs(options, camera, error, grid)
     optical = InputImage(
         lambda px: camera.project(terrain.under(grid.pixel_to_map(px))),
-        Grid(PIXEL_COORDINATES, None, *size),
+        grid.on_own_pixels(),
     )
     return SensorImage(
         options=options,
@@ -217,7 +217,7 @@ def _margin_px(options: SensorOptions, grid: Grid, camera: PushBroom, error: Att
 
     The scene covers all ground that the image shows, by its true geometry and by its RPCs.
     """
-    outline = Grid(PIXEL_COORDINATES, None, *options.scene.size_px).outline()
+    outline = grid.outline()
     seen = [
         grid.map_to_pixel(camera.localise(px, GROUND_M + height_m))
         for px in (outline, error.inverse()(outline))

@@ -79,9 +79,9 @@ class RasterFilter:
                 tiles(source.grid),
                 workers + 1,
             )
-            for i, (tile, bands, valid) in enumerate(filtered):
+            done = context.progress.over(filtered, tile_count(source.grid))
+            for tile, bands, valid in done:
                 file.write(bands, window=tile, valid=valid)
-                context.update((i + 1) / tile_count(source.grid))
 
     def tile(self, tile: Window) -> tuple[NDArray[Any], Mask]:
         """Return all bands of a tile, filtered, and which pixels of the first band are valid."""

@@ -208,7 +208,7 @@ def estimate_rotation(
             verdict, pose = confirm_pose((own, other), windows, pose, context.quiet())
         context.update(0.8, "writing")
         if picture is not None:
-            title = f"{'accepted' if verdict.accepted else 'refused'}: {verdict.reason}"
+            title = f"{verdict.word}: {verdict.reason}"
             draw_rotation(outputs.stage(picture), *pair, limits, pose, title, context.quiet())
         if verdict.accepted and pose is not None:
             found_transform = windows.transform(pose)

@@ -14,20 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..evidence import (
-    AGREEMENT,
-    ASSESSMENT,
-    BANDS,
-    ERROR,
-    IMAGES,
-    POSE,
-    REFINEMENT,
-    SCENE,
-    SEARCH,
-    SERIES,
-    SURVEY,
-    TIE_POINTS,
-)
+from .. import evidence
 from .agreement import AGREEMENT_RULES
 from .assessment import ASSESSMENT_RULES
 from .bands import BANDS_RULES
@@ -46,16 +33,16 @@ __all__ = ["RULES", "Rule"]
 
 # By the stage whose evidence they read, in the order in which they are applied.
 RULES: Mapping[str, tuple[Rule, ...]] = {
-    TIE_POINTS: TIE_POINT_RULES,
-    BANDS: BANDS_RULES,
-    IMAGES: IMAGES_RULES,
-    SEARCH: SEARCH_RULES,
-    ASSESSMENT: ASSESSMENT_RULES,
-    POSE: POSE_RULES,
-    AGREEMENT: AGREEMENT_RULES,
-    ERROR: ERROR_RULES,
-    SCENE: SCENE_RULES,
-    SURVEY: SURVEY_RULES,
-    REFINEMENT: REFINEMENT_RULES,
-    SERIES: SERIES_RULES,
+    evidence.TIE_POINTS: TIE_POINT_RULES,
+    evidence.BANDS: BANDS_RULES,
+    evidence.IMAGES: IMAGES_RULES,
+    evidence.SEARCH: SEARCH_RULES,
+    evidence.ASSESSMENT: ASSESSMENT_RULES,
+    evidence.POSE: POSE_RULES,
+    evidence.AGREEMENT: AGREEMENT_RULES,
+    evidence.ERROR: ERROR_RULES,
+    evidence.SCENE: SCENE_RULES,
+    evidence.SURVEY: SURVEY_RULES,
+    evidence.REFINEMENT: REFINEMENT_RULES,
+    evidence.SERIES: SERIES_RULES,
 }
