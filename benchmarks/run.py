@@ -44,6 +44,7 @@ SUITES = (
     "methods",
     "peaks",
     "fusion",
+    "sensitivity",
     "optical",
     "series",
     "attacks",
