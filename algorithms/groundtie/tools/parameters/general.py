@@ -1,4 +1,4 @@
-"""Parameters that several tools share, declared once."""
+"""Parameters of tools, most of them of several, declared once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters that registering tools share, declared once."""
+"""Parameters of tools that register, declared once."""
 
 from __future__ import annotations
 
