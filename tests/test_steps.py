@@ -13,7 +13,8 @@ from textured_pairs import texture
 from groundtie import Raster, steps
 from groundtie.errors import NoOverlapError, ParameterError, TooFewPointsError
 from groundtie.geometry.fitting import fit_model
-from groundtie.geometry.models import shift_model
+from groundtie.geometry.models import TERRAIN, Frame, shift_model
+from groundtie.geometry.terrain_model import TerrainModel
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.rasters.pair import ImagePair
@@ -25,6 +26,8 @@ SIZE = 384
 MARGIN = 20
 # What lies at a pixel of the reference lies so many columns and rows further on in the input.
 SHIFT = np.array([4, -3])
+NOWHERE: Any = None
+OF_TERRAIN = TerrainModel(TERRAIN, Frame.around(9.0 * np.eye(2)), np.zeros((4, 2)), NOWHERE, 0.0)
 
 
 def pair(seed: int = 0, noise: float = 0.2) -> tuple[Any, Any]:
@@ -273,6 +276,7 @@ class TestWhatCannotBeMatchedOrJudged:
         [
             ({"model": None}, "model must be a Model, not a NoneType"),
             ({"model": steps.Fit(shift_model(0, 0), np.ones(3, bool), 1.0)}, "not a Fit"),
+            ({"model": OF_TERRAIN}, "points alone do not determine a model of terrain"),
             ({"points": [[0, 0]]}, "points must be a TiePoints, not a list"),
             ({"spec": "x"}, "spec must be a Specification, not a str"),
         ],

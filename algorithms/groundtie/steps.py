@@ -23,6 +23,7 @@ from .geometry.estimation import Estimate, fit_without_blocks
 from .geometry.fitting import require_determined
 from .geometry.models import KINDS, Model, shift_model
 from .geometry.robust import find_consensus, fit_robustly
+from .geometry.terrain_model import TerrainModel
 from .geometry.tie_points import TiePoints
 from .geometry.transform import as_positions
 from .kinds import Choice, Number
@@ -303,6 +304,8 @@ def judge(
     """
     _require("model", model, Model)
     _require("points", points, TiePoints)
+    if isinstance(model, TerrainModel):
+        raise ParameterError("points alone do not determine a model of terrain: use coregister")
     with _stages(reference, input, spec, context) as (stages, running):
         pair = stages.masked.pair
         transform = pair.transform(model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,6 +142,21 @@ class TestWrongMatches:
         assert errors.of_inliers(3.0).used.mean() < 0.2
         # A smaller one than usual makes no outliers.
         np.testing.assert_array_equal(errors.of_inliers(0.5).used, errors.of_inliers().used)
+
+    @pytest.mark.parametrize("finer", [0.5, 4.0, 8.0])
+    @pytest.mark.parametrize("limit", [None, 3.0])
+    def test_the_size_of_the_inputs_pixels_makes_no_outlier(
+        self, finer: float, limit: float | None
+    ) -> None:
+        """The same matches, in pixels of an input that is finer than the reference, or coarser."""
+        one = self.errors(60, 15, sigma=1.5)
+        scaled = replace(one, error_px=finer * one.error_px, window_px=finer * one.window_px)
+        expected, found = (
+            errors.of_inliers(None if limit is None else size * limit)
+            for errors, size in ((one, 1.0), (scaled, finer))
+        )
+        np.testing.assert_array_equal(found.used, expected.used)
+        assert found.used[:60].mean() > 0.9
 
     def test_matches_that_are_all_wrong_are_no_ground_for_a_verdict(self) -> None:
         verdict = Assessment(test_points=self.errors(0, 30).of_inliers(3.0)).judge(3.0)

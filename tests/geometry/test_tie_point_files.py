@@ -16,6 +16,7 @@ from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.tie_point_files import read_tie_points, write_tie_points
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
+from groundtie.geometry.vector_layers import write_vector_layer
 from groundtie.rasters.atomic import Outputs
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, reproject
 
@@ -290,6 +291,38 @@ def test_another_raster_of_the_scene_finds_its_pixels_by_nominal_positions(
         found = read_tie_points(path, GRID.scaled(4))
         # Pixels four times as large: centres at (p + 0.5) / 4 - 0.5
         np.testing.assert_allclose(found.input_px, (points.input_px + 0.5) / 4 - 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".geojson", ".gpkg"])
+def test_drawn_lines_without_a_crs_of_their_own_have_that_of_the_layer(
+    tmp_path: Path, suffix: str
+) -> None:
+    """A scan has none that could stand for it."""
+    path, degrees = tmp_path / f"lines{suffix}", CRS.from_epsg(4326)
+    ends = [(10.0 + k / 100, 45.0 + k * k / 1000) for k in range(4)]
+    records = [
+        {
+            "geometry": {"type": "LineString", "coordinates": [(10.0, 45.0), end]},
+            "properties": {
+                "reference_x": end[0],
+                "reference_y": end[1],
+                "input_col": 100.0 * k,
+                "input_row": 50.0 * k,
+            },
+        }
+        for k, end in enumerate(ends)
+    ]
+    if suffix == ".gpkg":
+        write_vector_layer(
+            path, "lines", records, dict.fromkeys(records[0]["properties"], "float"), degrees
+        )
+    else:
+        features = [{"type": "Feature", **record} for record in records]
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    found = read_tie_points(path, Grid(PIXEL_COORDINATES, None, 400, 300))
+    assert found.crs == degrees
+    np.testing.assert_allclose(found.reference_xy, ends, atol=1e-9)
+    assert found.input_px.tolist() == [[100.0 * k, 50.0 * k] for k in range(4)]
 
 
 def test_a_table_that_a_person_made(tmp_path: Path) -> None:

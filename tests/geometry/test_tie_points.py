@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from affine import Affine
 from raster_files import UTM, utm_grid
+from rasterio.crs import CRS
 
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
-from groundtie.rasters.grid import apply_affine, compose
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
 
 GRID = utm_grid(100, 100)
 NOMINAL = Transform.nominal(UTM, GRID)
@@ -48,6 +49,16 @@ def test_residuals_on_a_grid_are_in_its_pixels(scale: float, angle_deg: float) -
     )
     found = points.residual_on(GRID, Transform(model, UTM, GRID))
     np.testing.assert_allclose(found, [[1, 0]] * 5, atol=1e-6)
+
+
+def test_pixels_are_no_longitudes() -> None:
+    """A scan without georeferencing may be tied to a map in degrees, far from column 0."""
+    scan = Grid(PIXEL_COORDINATES, None, 2000, 1500)
+    px = np.array([[10.0, 20.0], [500.0, 700.0], [1990.0, 1400.0]])
+    degrees = CRS.from_epsg(4326)
+    points = replace(some_points(3), reference_xy=[-100.0, 45.0] + 1e-4 * px, input_px=px)
+    found = points.nominal_xy(Transform.nominal(degrees, scan))
+    np.testing.assert_array_equal(found, px)
 
 
 def test_rejecting_keeps_the_first_reason() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio
+import rasterio.shutil
 from affine import Affine
 from raster_files import UTM, full_disk, utm_grid, wave_image, waves, write_raster
 from rasterio.enums import ColorInterp
@@ -370,6 +371,21 @@ def test_a_new_geotransform_leaves_the_pixels_untouched(
         assert (new.transform, new.crs, new.nodata) == (moved.transform, UTM, 7)
     with pytest.raises(ValueError, match="size"):
         write_with_geotransform(open_raster(path), GRID.scaled(2), tmp_path / "out.tif")
+
+
+def test_bands_of_several_types_may_stay_untouched(tmp_path: Path) -> None:
+    texts = []
+    for dtype in ("uint8", "float32"):
+        path = write_raster(tmp_path / f"{dtype}.tif", (IMAGE % 200).astype(dtype), GRID)
+        rasterio.shutil.copy(path, tmp_path / f"{dtype}.vrt", driver="VRT")
+        texts.append((tmp_path / f"{dtype}.vrt").read_text())
+    stack, band = tmp_path / "both.vrt", texts[1].partition("<VRTRasterBand")[2]
+    second = f"<VRTRasterBand{band}".replace('band="1"', 'band="2"', 1)
+    stack.write_text(texts[0].replace("</VRTDataset>", second))
+    moved = GRID.shifted(1.25, -3.5)
+    write_with_geotransform(open_raster(stack), moved, tmp_path / "out.tif")
+    with rasterio.open(tmp_path / "out.tif") as new:
+        np.testing.assert_array_equal(new.read(), np.stack([IMAGE % 200] * 2))
 
 
 def test_tiles_cover_every_pixel_once() -> None:

@@ -100,3 +100,12 @@ def test_voids_that_are_open_to_the_edge_stay(tmp_path: Path, size: int) -> None
     assert np.abs(found - ramp(size, size) / 10)[~is_open & ~near_rim].max() < 1.0
     assert np.isfinite(whole).all()
     assert measured.mean() == pytest.approx(1 - (is_open | is_enclosed).mean(), abs=0.01)
+
+
+def test_what_has_no_place_on_the_terrain_model_is_not_enclosed(tmp_path: Path) -> None:
+    grid = utm_grid(60, 40)
+    path = write_raster(tmp_path / "dem.tif", ramp(40, 60), grid)
+    places = np.array([[20.0, 10.0], [np.nan, np.nan], [np.inf, 3.0], [30.0, 30.0]])
+    with open_raster(path) as dem:
+        surface = surface_around(dem, lambda px: px, grid.outline())
+        assert surface.encloses(places).tolist() == [True, False, False, True]

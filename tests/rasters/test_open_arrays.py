@@ -425,3 +425,10 @@ def test_an_array_without_rioxarray_is_explained() -> None:
 
     with pytest.raises(ParameterError, match="needs rioxarray"):
         open_raster(Bare())
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4978", 'LOCAL_CS["site",UNIT["metre",1]]'])
+def test_a_crs_without_a_map_is_refused_as_that_of_a_file_is(crs: str) -> None:
+    values = np.zeros((20, 30), np.uint8)
+    with pytest.raises(GeoreferencingError):
+        open_raster(Raster(values, Affine.scale(10, -10), crs))

@@ -463,3 +463,18 @@ def test_nothing_is_searched_where_the_images_cannot_overlap(files: Files, asked
     whole = make_pair(files.image(), files.image(GRID.shifted(200, 0)), search_radius_m=farthest)
     if asked_m > farthest:
         assert (pair.grid, pair.surroundings) == (whole.grid, whole.surroundings)
+
+
+def test_an_image_is_rotated_on_the_ground_whatever_the_shape_of_pixels(files: Files) -> None:
+    """At 60° north, pixels of degrees are twice as high as wide."""
+    grid = Grid(Affine(1e-4, 0, 10.0, 0, -1e-4, 60.02), GEOGRAPHIC, 400, 400)
+    part = grid.window(150, 150, 100, 100)
+    images = [
+        Image(files.open(np.arange(of.width * of.height, dtype=np.float32).reshape(of.size), of))
+        for of in (grid, part)
+    ]
+    pair = make_pair(*images, search_radius_m=5.0, rotation_deg=90.0)
+    width_m, height_m = grid.pixel_sides_m
+    diagonal_m = np.hypot(100 * width_m, 100 * height_m)
+    assert pair.grid.width * width_m == pytest.approx(diagonal_m + 10, abs=3 * width_m)
+    assert pair.grid.height * height_m == pytest.approx(diagonal_m + 10, abs=3 * height_m)

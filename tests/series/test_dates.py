@@ -12,14 +12,17 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.shutil
+from affine import Affine
 from numpy.typing import NDArray
 from raster_files import utm_grid, write_raster
+from rasterio.crs import CRS
 from rasterio.io import MemoryFile
 from series_dates import FRAME
 from shapely.geometry import box, mapping
 from textured_pairs import texture
 
 from groundtie.context import Context
+from groundtie.rasters.grid import Grid
 from groundtie.registration.user_masks import UserMask
 from groundtie.series import dates
 from groundtie.series.dates import open_dates
@@ -213,7 +216,7 @@ def test_a_truncated_date_is_left_out_alone_whether_held_or_not(
     with ExitStack() as stack:
         found, failures = open_dates(listed, None, stack, one_thread)
         assert [date.name for date in found] == ["a", "c"]
-        assert [date.footprint(GRID.crs).area for date in found] == [(10.0 * SIZE) ** 2] * 2
+        assert [date.footprint(GRID).area for date in found] == [(10.0 * SIZE) ** 2] * 2
     assert failures.keys() == {"b"} and "b.tif" in failures["b"]
 
 
@@ -267,3 +270,26 @@ def sidecar(path: Path, crs: str, left: int) -> None:
     """Write georeferencing into the file of GDAL beside a raster."""
     place = f"<SRS>{crs}</SRS><GeoTransform>{left},10,0,5000000,0,-10</GeoTransform>"
     path.with_name(f"{path.name}.aux.xml").write_text(f"<PAMDataset>{place}</PAMDataset>")
+
+
+def test_footprints_count_longitudes_alike(tmp_path: Path, one_thread: Context) -> None:
+    listed = []
+    for name, west in (("a", 179.8), ("b", -180.2), ("c", 539.8)):
+        grid = Grid(Affine(1e-3, 0, west, 0, -1e-3, 45.0), CRS.from_epsg(4326), SIZE, SIZE)
+        path = write_raster(tmp_path / f"{name}.tif", texture(SIZE, SIZE).astype("f4"), grid)
+        listed.append(Listed(name, path, None))
+    with ExitStack() as stack:
+        found, _ = open_dates(listed, None, stack, one_thread)
+        footprints = [date.footprint(found[0].source.grid) for date in found]
+    shares = dates.footprint_shares(footprints)
+    assert list(shares.values()) == pytest.approx([1.0] * 3, abs=1e-6)
+
+
+def test_the_footprint_of_a_narrow_strip_is_as_wide_as_the_strip(
+    tmp_path: Path, one_thread: Context
+) -> None:
+    grid = utm_grid(10_000, 77)
+    path = write_raster(tmp_path / "a.tif", np.ones((77, 10_000), np.uint8), grid)
+    with ExitStack() as stack:
+        ((date,), _) = open_dates([Listed("a", path, None)], None, stack, one_thread)
+        assert date.footprint(grid).area == pytest.approx(77 * 10_000 * 100)

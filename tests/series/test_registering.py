@@ -271,3 +271,19 @@ def test_what_is_known_is_not_registered_again(matching: Make) -> None:
     more.from_hub(0)
     assert set(more.results) - set(first.results) == {(0, 4), (3, 4)}
     assert more.done == 2
+
+
+@pytest.mark.parametrize("is_first_placed", [True, False])
+def test_a_pair_that_is_known_both_ways_is_one_registration(
+    matching: Make, is_first_placed: bool
+) -> None:
+    """One hub's loop is another hub's registration: it does not confirm itself."""
+    ways = {}
+    for ends, placed in (((0, 1), is_first_placed), ((1, 0), not is_first_placed)):
+        settings = SETTINGS.of_loops() if placed else SETTINGS
+        dates: list[Any] = [FakeDate(str(k)) for k in ends]
+        key = pair_key(*dates, settings, FRAME)
+        names = [date.name for date in dates]
+        ways[key] = PairResult(*names, key, True, "", "yes", 0.3, ZERO, PRECISE, is_placed=placed)
+    (found,) = matching(2, known=ways).results.values()
+    assert not found.is_placed, "the registration by all rules counts"

@@ -153,8 +153,11 @@ class PointErrors(Rows):
         errors = self.error_px[which]
         if len(errors) == 0:
             return self
-        limit = USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px
-        mixture = fit_mixture(errors, self._window_area_px2, sigma_range_px(limit))
+        # The verdict's limits are in matching pixels, of which windows have a number.
+        pixel = self.window_px / WINDOW_PX
+        limit = USUAL_MAX_ERROR_PX if max_error_px is None else max_error_px / pixel
+        area = self._window_area_px2 / pixel**2
+        mixture = fit_mixture(errors / pixel, area, sigma_range_px(limit))
         counted = np.zeros(len(self), bool)
         counted[which] = mixture.inliers
         return replace(self, counted=counted)

@@ -110,9 +110,12 @@ class TiePoints(Rows):
     def nominal_xy(self, transform: Transform) -> FloatArray:
         """Return the nominal positions on the reference map, shape (n, 2), by a transform's input.
 
-        Across the antimeridian, longitudes continue those of the points.
+        Across the antimeridian, longitudes continue those of the points. Without a CRS of the
+        input, the positions are its pixels'.
         """
         nominal = transform.nominal_xy(self.input_px)
+        if transform.input_grid.crs is None:
+            return nominal
         return near_longitude(nominal, self.reference_xy[:, :1], transform.crs)
 
     def residual_px(self, transform: Transform) -> FloatArray:

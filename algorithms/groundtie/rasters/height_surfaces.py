@@ -87,8 +87,11 @@ class RasterSurface:
 
     def encloses(self, positions: FloatArray) -> Mask:
         """Return which positions, (n, 2), lie on values of the raster or in voids amid them."""
-        col, row = np.rint(self.to_px(positions)).T
-        return np.asarray(self.amid[self._nearest(*self._reduced(col, row))])
+        px = self.to_px(positions)
+        enclosed: Mask = np.asarray(np.isfinite(px).all(axis=1))
+        col, row = np.rint(px[enclosed]).T
+        enclosed[enclosed] = self.amid[self._nearest(*self._reduced(col, row))]
+        return enclosed
 
     def piece(self, px: FloatArray) -> SurfacePiece:
         """Return the part of the surface needed for pixel positions, (n, 2)."""

@@ -308,7 +308,7 @@ def make_pair(
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
     if not limits.is_shift:
-        outline = _rotated(outline, rotation_deg, scale)
+        outline = _rotated(outline, grid.pixel_sides_m, rotation_deg, scale)
     # Measured in the shorter side of a pixel, so that the radius is covered along that axis, too.
     side_m = min(grid.pixel_sides_m)
     limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * side_m))
@@ -339,15 +339,20 @@ def _farthest_px(grid: Grid, outline_px: FloatArray) -> float:
     return float(np.hypot(*np.maximum(np.array(grid.size) - low, high)))
 
 
-def _rotated(outline_px: FloatArray, largest_deg: float, largest_scale: float) -> FloatArray:
-    """Return the points of an outline, shape (n, 2), rotated and scaled about its centre."""
+def _rotated(
+    outline_px: FloatArray, sides_m: tuple[float, float], largest_deg: float, largest_scale: float
+) -> FloatArray:
+    """Return the points of an outline, shape (n, 2), rotated and scaled about its centre.
+
+    Shapes are preserved on the ground: `sides_m` are those of a pixel.
+    """
     centre = np.add(*_extent(outline_px)) / 2
     steps = int(np.ceil(2 * largest_deg / _ANGLE_STEP_DEG)) + 1
     angles = np.radians(np.linspace(-largest_deg, largest_deg, steps))
     cosine, sine = np.cos(angles), np.sin(angles)
     rotations = np.array([[cosine, -sine], [sine, cosine]])
-    around = largest_scale * (finite(outline_px) - centre)
-    return np.asarray(centre + np.einsum("ijk,nj->kni", rotations, around).reshape(-1, 2))
+    around = largest_scale * (finite(outline_px) - centre) * sides_m
+    return np.asarray(centre + np.einsum("ijk,nj->kni", rotations, around).reshape(-1, 2) / sides_m)
 
 
 def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None) -> Window:

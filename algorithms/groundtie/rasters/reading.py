@@ -18,7 +18,7 @@ from ..arrays import Raster, in_memory
 from ..errors import BandError, RasterOpenError
 from ..raster_names import is_remote, raster_name
 from .averaging import average_window
-from .grid import PIXEL_COORDINATES, Grid
+from .grid import PIXEL_COORDINATES, Grid, require_map
 from .handles import ArrayHandles, FileHandles, Handles, OpenDataset
 from .metadata import (
     MOST_BANDS,
@@ -32,7 +32,7 @@ from .metadata import (
 )
 from .nodata import are_measured
 from .remote_overviews import RemoteOverviews
-from .windows import FloatImage, Mask, Window, read_window
+from .windows import FloatImage, Mask, Window, read_values, read_window
 
 # Images without georeferencing are a supported case, see `Grid.is_georeferenced`.
 warnings.filterwarnings("ignore", category=NotGeoreferencedWarning)
@@ -240,14 +240,14 @@ class RasterSource:
             return list(dataset.files)
 
     def read_untouched(self, window: Window) -> tuple[NDArray[Any], NDArray[np.uint8] | None]:
-        """Read all bands, (bands, h, w), and the mask, (h, w), as stored, of a window inside.
+        """Read all bands, (bands, h, w), and the mask, (h, w), of a window inside, without change.
 
         The mask is None if the raster has no mask band.
         """
         place = rasterio.windows.Window(*window)
         with self._handles.borrow() as dataset:
             mask = dataset.read_masks(1, window=place) if self.has_mask_band else None
-            return dataset.read(window=place), mask
+            return read_values(dataset, self, place, range(1, self.count + 1)), mask
 
 
 def open_raster(value: Any, *, allow_sensor_geometry: bool = False) -> RasterSource:
@@ -314,7 +314,7 @@ def _source_of_array(raster: Raster) -> RasterSource:
     band = BandInfo.plain(raster.values.dtype.name, raster.nodata)
     return RasterSource(
         path=raster.name,
-        grid=Grid(transform, raster.crs, raster.width, raster.height),
+        grid=Grid(transform, require_map(raster.crs), raster.width, raster.height),
         bands=(band,) * len(raster.bands),
         has_mask_band=np.ma.is_masked(raster.values),
         has_masks_by_band=_masks_differ(raster),

@@ -94,13 +94,16 @@ def read_window(
         shape = (len(bands), window.height, window.width)
         return np.zeros(shape, source.dtype), np.zeros(shape, bool)
     place = rasterio.windows.Window(*inside)
-    values = _read(dataset, source, place, bands)
+    values = read_values(dataset, source, place, bands)
     valid = _validity(dataset, source, place, bands, values)
     around = window._replace(col=window.col - inside.col, row=window.row - inside.row)
     return cut(values, around), cut(valid, around)
 
 
-def _read(dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]) -> NDArray[Any]:
+def read_values(
+    dataset: Any, source: RasterSource, place: Any, bands: Sequence[int]
+) -> NDArray[Any]:
+    """Return some bands of a window inside the raster, in the type that holds all of them."""
     if len({source.bands[number - 1].dtype for number in bands}) == 1:
         return np.asarray(dataset.read(list(bands), window=place, out_dtype=source.dtype))
     # rasterio can read bands of different types only one by one.

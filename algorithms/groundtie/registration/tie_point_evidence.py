@@ -11,7 +11,7 @@ import numpy as np
 from affine import Affine
 from numpy.typing import NDArray
 
-from ..errors import TooFewPointsError
+from ..errors import ParameterError, TooFewPointsError
 from ..geometry.chance import log10_least_false_alarms
 from ..geometry.fitting import ROUNDING, fit_model
 from ..geometry.models import DEGREE, Frame, fewest_points, monomials
@@ -19,6 +19,9 @@ from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
 from .evidence import TIE_POINTS
+
+# Models that neither mirror nor, the first two, scale.
+_SHAPES = ("translation", "rigid", "similarity")
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,15 @@ class TiePointEvidence:
         ------
         TooFewPointsError
             They are fewer than the model needs.
+        ParameterError
+            The model can neither scale nor mirror pixels without a map, as a map needs.
         """
+        is_scan = not input_grid.is_georeferenced and points.crs is not None
+        if is_scan and kind in _SHAPES:
+            raise ParameterError(
+                f"the {kind} model cannot take a raster without georeferencing to a map, whose "
+                "rows run downwards: give model affine, or one that bends"
+            )
         found = cls(points, kind, input_grid)
         if found.count < found.needed:
             raise TooFewPointsError(
@@ -141,7 +152,7 @@ class TiePointEvidence:
             return math.inf
         frame = Frame.around(places)
         uv, border = frame.enter(places), frame.enter(self.input_grid.outline())
-        if self.kind in ("rigid", "similarity"):
+        if self.kind in _SHAPES[1:]:
             design, at = (np.column_stack([np.ones(len(p)), p @ [1, 1j]]) for p in (uv, border))
         else:
             design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))

@@ -132,7 +132,7 @@ class SeriesCall:
         frame = stored.frames.get(key)  # stored registrations refer to it
         if frame is None or not frame.is_of(home.source.grid):
             frame = SeriesFrame.around(home.source.grid, [date.source.grid for date in dates])
-        footprints = [date.footprint(frame.grid.crs) for date in dates]
+        footprints = [date.footprint(frame.grid) for date in dates]
         matching = Matching(
             dates,
             footprint_shares(footprints),

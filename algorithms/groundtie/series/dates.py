@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rasterio.crs import CRS
+from affine import Affine
 from rasterio.features import shapes
 from shapely.geometry import Polygon
 from shapely.ops import unary_union
@@ -21,7 +21,7 @@ from ..errors import CancelledError, GroundTieError
 from ..masks.radar import LEAST_VARIATION2, variation2_of
 from ..memory import DATES_SHARE, share_bytes
 from ..raster_names import facts_behind
-from ..rasters.grid import FloatArray, Grid, reproject
+from ..rasters.grid import FloatArray, Grid, compose, near_longitude, reproject
 from ..rasters.held_images import held_grey
 from ..rasters.pair import Image
 from ..rasters.radar_tags import is_known_radar
@@ -133,12 +133,21 @@ class Date:
         source, band = self.matched.source, self.matched.band
         small = overview_grid(source.grid, _FOOTPRINT_PX)
         _, valid = source.read(source.window, band, (small.height, small.width))
-        found = shapes(valid.astype(np.uint8), valid, transform=small.transform)
+        # The pixels read are a whole number along either side, those of `small` square.
+        scale = Affine.scale(source.grid.width / small.width, source.grid.height / small.height)
+        found = shapes(
+            valid.astype(np.uint8), valid, transform=compose(source.grid.transform, scale)
+        )
         return [np.array(geometry["coordinates"][0]) for geometry, _ in found]
 
-    def footprint(self, crs: CRS | None) -> Any:
-        """Return the outline of its valid pixels as a shapely polygon on a map."""
-        moved = [Polygon(reproject(ring, self.source.grid.crs, crs)) for ring in self.rings]
+    def footprint(self, grid: Grid) -> Any:
+        """Return the outline of its valid pixels as a shapely polygon on the map of a grid.
+
+        Longitudes are those nearest to the grid's.
+        """
+        middle, crs = grid.pixel_to_map([grid.centre_px])[0, 0], grid.crs
+        rings = (reproject(ring, self.source.grid.crs, crs) for ring in self.rings)
+        moved = [Polygon(near_longitude(ring, middle, crs)) for ring in rings]
         sound = [polygon.buffer(0) for polygon in moved if np.isfinite(polygon.bounds).all()]
         return unary_union(sound)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field, replace
-from itertools import compress, permutations
+from itertools import combinations, compress, product
 
 import numpy as np
 
@@ -80,14 +80,17 @@ class Matching:
     def __post_init__(self) -> None:
         if not self.known:
             return
-        for i, j in permutations(range(len(self.dates)), 2):
-            first, second = self.dates[i], self.dates[j]
-            for settings in (self.settings, self.settings.of_loops()):
+        for pair in combinations(range(len(self.dates)), 2):
+            # Both directions may be known, as the hub changes: a pair is one registration.
+            for settings, ends in product(
+                (self.settings, self.settings.of_loops()), (pair, pair[::-1])
+            ):
+                first, second = (self.dates[date] for date in ends)
                 key = pair_key(first, second, settings, self.frame)
                 if key in self.known:
                     # The same files may have had other names.
                     known = replace(self.known[key], first=first.name, second=second.name)
-                    self.results[i, j] = known
+                    self.results[ends] = known
                     self.reused += 1
                     break
 
