@@ -107,6 +107,14 @@ class TestPointErrors:
         assert (summary["points"], summary["points_used"]) == (3, 2)
         assert summary["rmse_px"] == pytest.approx(0, abs=1e-6)
 
+    @pytest.mark.parametrize("tolerance_px", [2.0, 3.0])
+    def test_what_agrees_depends_on_the_tolerance(self, tolerance_px: float) -> None:
+        transform, xy = shifted(0, 0), places()
+        error = np.tile([2.5, 0.0], (len(xy), 1))
+        found = PointErrors.of(transform, xy, transform(xy) + error)
+        agreeing = replace(found, tolerance_px=tolerance_px).agreeing
+        assert agreeing.all() == agreeing.any() == (tolerance_px > 2.5)
+
     def test_no_points(self) -> None:
         found = PointErrors.none().of_inliers()
         assert len(found) == found.summary()["points"] == 0

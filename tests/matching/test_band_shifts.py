@@ -136,3 +136,16 @@ def test_displaced_bands_of_real_images_are_found(
     bands[2] = moved(bands[2], (5, -4))
     (found,) = found_in(write_raster(tmp_path / "i.tif", bands))
     assert found.bands == (1, 3) and found.apart_px == pytest.approx(np.hypot(5, 4), abs=0.5)
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_bands_of_small_images_are_compared_all_over(
+    bands: np.ndarray, corner: tuple[int, int], tmp_path: Path
+) -> None:
+    """One window would lie in the corner without data."""
+    bands[1] = moved(bands[1])
+    small = bands[:, :380, :380].astype(np.float32)
+    rows, cols = (slice(190 * at, 190 * at + 190) for at in corner)
+    small[:, rows, cols] = -1
+    (found,) = found_in(write_raster(tmp_path / "i.tif", small, nodata=-1))
+    assert found.bands == (1, 2) and found.apart_px == pytest.approx(np.hypot(*SHIFT), abs=0.3)

@@ -92,6 +92,28 @@ def test_chips_support_their_neighbours_however_small_the_level(
     assert neighbours.min() >= 3
 
 
+@pytest.mark.parametrize("size", [(500, 30), (30, 500), (400, 60)])
+def test_narrow_strips_have_chips_of_their_width_once(
+    size: tuple[int, int], tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[FloatArray] = []
+    propagated = level_fit.propagate
+
+    def remember(surfaces: Surfaces, centres: FloatArray, reach_px: float) -> Surfaces:
+        seen.append(centres)
+        return propagated(surfaces, centres, reach_px)
+
+    monkeypatch.setattr(level_fit, "propagate", remember)
+    files = write_textured_pair(tmp_path, size, similarity((70, -45), 0.0))
+    with files.opened() as pair:
+        found = fitted(pair, shift_on_map(40.0, -20.0), context)
+    (centres,) = seen
+    # Chips beside one another that share most pixels would count twice.
+    assert min(len(np.unique(along)) for along in centres.T) == 1
+    assert found.log10_false_alarms < -4
+    assert error_m(found.model, files) < 10
+
+
 def test_two_places_have_nothing_in_common(other_place: TexturedPair, context: Context) -> None:
     with other_place.opened() as pair:
         start = shift_on_map(0, 0)

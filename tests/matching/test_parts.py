@@ -9,6 +9,7 @@ from raster_files import utm_grid
 from groundtie.matching.parts import (
     LEAST_EXCESS,
     find_parts,
+    largest_group,
 )
 
 RADIUS = 24
@@ -152,3 +153,17 @@ def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
         if len(of) >= 3
     )
     assert part.excess == pytest.approx(highest)
+
+
+@pytest.mark.parametrize("missing", [0, 1, 3])
+def test_chips_on_both_sides_of_a_gap_are_no_neighbours(missing: int) -> None:
+    """Three chips in a row make a part; not if water lies between them."""
+    kept = (CENTRES[:, 0] // 50 < 2) | (CENTRES[:, 0] // 50 >= 2 + missing)
+    row = (CENTRES[:, 1] // 50 == 2) & kept
+    three = np.flatnonzero(row)[:3]
+    surfaces = noise()
+    raised(surfaces, np.isin(np.arange(len(CENTRES)), three), (9, 0), 9.0)
+    found = list(find_parts(GRID, CENTRES[kept], surfaces[kept]))
+    assert len(found) == (missing == 0)
+    chips = np.isin(np.flatnonzero(kept), three)
+    assert len(largest_group(CENTRES[kept], chips)) == (3 if missing == 0 else 2)

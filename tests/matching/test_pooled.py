@@ -210,3 +210,13 @@ def test_neighbours_show_what_single_chips_do_not() -> None:
         return int((np.hypot(*errors.T) < 1).sum())
 
     assert right(chips) < 27 and right(chips.with_neighbours(61)) > 65
+
+
+@pytest.mark.parametrize("size", [(512, 29), (40, 300), (128, 64)])
+def test_narrow_grids_are_covered_by_smaller_tiles(size: tuple[int, int]) -> None:
+    grid = utm_grid(*size)
+    places = Places.tiles(grid, 64)
+    covered = len(places.centres) * places.chip_px**2
+    assert covered >= 0.75 * grid.width * grid.height
+    assert (places.corners >= 0).all()
+    assert (places.corners + places.chip_px <= grid.size).all()

@@ -231,7 +231,7 @@ def test_the_rayleigh_curve_is_the_distribution_of_the_rmse() -> None:
     verdict = replace(VERDICT, check_rmse_px=1.3, check_points_agreeing=40)
     expected = scipy.stats.rayleigh(scale=1.3 / np.sqrt(2))
     at = np.linspace(0, 10, 1001)
-    counts = figures.rayleigh_counts(at, 0.01, verdict)
+    counts = figures.rayleigh_counts(at, 0.01, verdict, TOLERANCE_PX)
     np.testing.assert_allclose(
         counts, 40 / expected.cdf(TOLERANCE_PX) * expected.pdf(at) * 0.01, rtol=1e-9
     )

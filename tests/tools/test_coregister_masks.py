@@ -5,19 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import fiona
 import numpy as np
 import pytest
 import rasterio
+from affine import Affine
 from raster_files import write_raster
+from scipy.ndimage import gaussian_filter
 from specified_runs import register_specified
 from tools.conftest import SimulatedFiles
 
+from groundtie import Raster
 from groundtie.errors import NotRegisteredError
 from groundtie.registration.specification import COREGISTER
 from groundtie.tools.coregister import coregister
 from groundtie.tools.filter_speckle import filter_speckle
+from groundtie.tools.match_optical import match_optical
 from groundtie.tools.simulate import simulate
 
 
@@ -125,3 +130,25 @@ def test_where_nothing_tells_the_radar_few_who_agree_are_not_enough(
     # Both rules apply: what heights may displace, and the few who agree.
     assert told["verdict"]["rule"] in ("uncertain transform", "town matched whole")
     assert told["mask"]["kind"] == "none"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tool", [coregister, match_optical])
+def test_a_mask_that_leaves_a_fifth_counts_on_either_image(tool: Callable[..., Any]) -> None:
+    """Scattered areas, as between clouds: chips meet as much of the one image as of the other."""
+    size, edge, (right, down) = 500, 20, (5, -3)
+    place, rng = Affine(10, 0, 5e5, 0, -10, 5e6), np.random.default_rng(2)
+    ground = 100 + 60 * gaussian_filter(rng.normal(size=(size + 2 * edge,) * 2), 1.5)
+    images = []
+    for col, row in ((0, 0), (right, down)):
+        part = ground[edge + row : edge + row + size, edge + col : edge + col + size]
+        noisy = part + rng.normal(0, 5, part.shape)
+        images.append(Raster(noisy.astype(np.float32), place, "EPSG:32632"))
+    cover = gaussian_filter(rng.normal(size=(size, size)), 5)
+    mask = Raster((cover > np.quantile(cover, 0.8)).astype(np.uint8), place, "EPSG:32632")
+    for name in ("reference_mask", "input_mask"):
+        with tool(*images, **{name: mask}) as found:
+            xy = found.pair.grid.pixel_to_map(found.pair.grid.places())
+            px = found.pair.reference.source.grid.map_to_pixel(xy)
+            assert np.abs(found.transform(xy) - (px - [right, down])).max() < 0.3
+            assert found.survey.confirming > 0.9 * len(found.survey.centres)

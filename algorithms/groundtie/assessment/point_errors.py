@@ -42,6 +42,8 @@ class PointErrors(Rows):
         map, shape (n, 2); None without metres.
     window_px
         Side of the windows in which the points were searched for.
+    tolerance_px
+        Largest error of points that agree.
     """
 
     position_px: FloatArray
@@ -50,6 +52,7 @@ class PointErrors(Rows):
     counted: Mask
     error_m: FloatArray | None = None
     window_px: float = WINDOW_PX
+    tolerance_px: float = TOLERANCE_PX
 
     @classmethod
     def of(cls, transform: Transform, reference_xy: ArrayLike, input_px: ArrayLike) -> PointErrors:
@@ -115,7 +118,7 @@ class PointErrors(Rows):
     @property
     def agreeing(self) -> Mask:
         """Which held-out points agree with the transform, shape (n,)."""
-        return self.check & (self.length_px <= TOLERANCE_PX)
+        return self.check & (self.length_px <= self.tolerance_px)
 
     @property
     def in_pixels(self) -> Statistics:

@@ -77,7 +77,7 @@ def band_shifts(source: RasterSource) -> Sequence[BandShift]:
     side = min(_WINDOW_PX, *source.grid.size)
     if len(bands) < 2 or side < _LEAST_PX:
         return ()
-    places = Places.spread(source.grid, side, lambda n: np.clip(n // side, 1, _MOST_ALONG))
+    places = Places.spread(source.grid, side, lambda n: np.clip(-(-n // side), 1, _MOST_ALONG))
     windows = [Window(int(col), int(row), side, side) for col, row in places.corners]
     known = before = _Band(_spectra(source, windows, bands[0]), bands[0], np.zeros(2))
     found = []

@@ -18,6 +18,7 @@ from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import (
+    MINIMUM_OVERLAP,
     SimilaritySettings,
     Surface,
     describe,
@@ -146,17 +147,23 @@ class ChipMatcher:
         reach = radius_px + BORDER_PX
         windows = ChipWindows(images, places, reach, self.held_out)
 
-        def of_chips(chips: Description, search: Description) -> Surface:
-            inner = chips.inner(radius_px)
-            return similarity_surface(inner, search, radius_px, self.settings)
+        def of_chips(chips: Description, search: Description, is_masked: bool) -> Surface:
+            least: float | NDArray[np.floating] = MINIMUM_OVERLAP
+            if is_masked:  # a chip can only overlap with what the mask leaves
+                least = least * search.patch.valid.mean(axis=(-2, -1), keepdims=True)
+            return similarity_surface(
+                chips.inner(radius_px), search, radius_px, self.settings, least_overlap=least
+            )
+
+        masked = [image.mask is not None for image in (self.pair.reference, self.pair.input)]
 
         def surfaces(reference: Patch, input: Patch) -> Surfaces:
             pixels = places.chip_px**2
             of_reference = describe(reference, pixels, self.settings, context.memo)
             of_input = describe(input, pixels, self.settings)
-            made = [of_chips(of_reference, of_input)]
+            made = [of_chips(of_reference, of_input, masked[1])]
             if ways == 2:
-                made.append(of_chips(of_input, of_reference)[..., ::-1, ::-1])
+                made.append(of_chips(of_input, of_reference, masked[0])[..., ::-1, ::-1])
             return np.stack(made, axis=1)
 
         def can_be_matched(reference: Patch, input: Patch) -> bool:

@@ -60,9 +60,10 @@ def fit_level(
     context
         Threads and progress.
     """
-    chip = int(np.clip(min(level.size) / 5, *_CHIP_RANGE_PX))
+    chip = min(int(np.clip(min(level.size) / 5, *_CHIP_RANGE_PX)), *level.size)
+    # Chips that overlap by more than half would count the same evidence twice.
     places = Places.spread(
-        level, chip, lambda side: np.clip((side - chip) / (chip / 2) + 1, 2, _CHIPS_PER_SIDE)
+        level, chip, lambda side: min((side - chip) / (chip / 2) + 1, _CHIPS_PER_SIDE)
     )
     images = matcher.resampled(model, level, radius_px, context)
     centres, surfaces = matcher.match_forward(images, places, radius_px, context)

@@ -46,7 +46,8 @@ class Places:
 
     @classmethod
     def tiles(cls, grid: Grid, chip_px: int) -> Places:
-        """Return chips that cover a grid side by side."""
+        """Return chips that cover a grid side by side; narrow grids have smaller ones."""
+        chip_px = min(chip_px, *grid.size)
         sides = (np.arange(side // chip_px) * chip_px + chip_px // 2 for side in grid.size)
         return cls(grid, mesh(*sides).astype(int), chip_px)
 
@@ -54,13 +55,17 @@ class Places:
     def spread(cls, grid: Grid, chip_px: int, count: Callable[[int], float]) -> Places:
         """Return chips from border to border, equally spaced along each axis to a pixel.
 
-        `count` takes the length of a side and returns the number of chips along it.
+        `count` takes the length of a side and returns the number of chips along it; a single one
+        lies in the middle.
         """
-        sides = (
-            np.linspace(chip_px / 2, length - chip_px / 2, int(count(length)))
-            for length in grid.size
-        )
-        return cls(grid, np.rint(mesh(*sides)).astype(int), chip_px)
+
+        def along(length: int) -> FloatArray:
+            number = int(count(length))
+            if number == 1:
+                return np.array([length / 2])
+            return np.linspace(chip_px / 2, length - chip_px / 2, number)
+
+        return cls(grid, np.rint(mesh(*map(along, grid.size))).astype(int), chip_px)
 
     @property
     def corners(self) -> NDArray[np.int_]:

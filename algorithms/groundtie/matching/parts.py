@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.judging import RIVAL_HEIGHT, TOLERANCE_PX
 from ..rasters.grid import FloatArray, Grid, mesh
 from .belief_propagation import Surfaces
@@ -195,11 +196,16 @@ def _excess(higher: FloatArray) -> float:
 
 
 def _are_neighbours(centres: NDArray[np.int_]) -> NDArray[np.bool_]:
-    """Return which chips of a regular layout are adjacent, (n, n), diagonals included."""
-    cols, rows = (np.unique(along, return_inverse=True)[1].reshape(-1) for along in centres.T)
-    return np.asarray(
-        (abs(np.subtract.outer(cols, cols)) <= 1) & (abs(np.subtract.outer(rows, rows)) <= 1)
-    )
+    """Return which chips of a regular layout are adjacent, (n, n), diagonals included.
+
+    Some of the layout's may be missing: those on both sides of a gap are not adjacent.
+    """
+    adjacent = np.ones((len(centres), len(centres)), bool)
+    for along in centres.T:
+        steps = np.diff(np.unique(along))
+        reach = NEIGHBOUR_SPACINGS * steps.min() if len(steps) else 0
+        adjacent &= abs(np.subtract.outer(along, along)) <= reach
+    return adjacent
 
 
 def _connected(

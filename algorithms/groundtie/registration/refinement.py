@@ -137,13 +137,17 @@ class RefinementEvidence:
             return LEFT_OUT, self.control, self.adjustment.left_out_px
         return CHECK_POINTS, self.check, self.check.residuals_px(self.adjustment.bias)
 
+    @property
+    def tolerance_px(self) -> float:
+        """Largest residual of held-out points that agree."""
+        return max(TOLERANCE_PX, self.max_error_px)
+
     @cached_property
     def _error(self) -> ErrorModel:
         _, points, after = self.held
         farthest = float(np.hypot(*after.T).max(initial=0.0))
         reach = int(np.ceil(reach_px(farthest, self.control.size)))
-        tolerance = max(TOLERANCE_PX, self.max_error_px)
-        misses = Misses(points.expected_px, after, reach, self.max_error_px, tolerance)
+        misses = Misses(points.expected_px, after, reach, self.max_error_px, self.tolerance_px)
         return ErrorModel(self.adjustment.fold_biases, misses, self.common)
 
 
@@ -279,6 +283,7 @@ class RefinedRpc:
             np.concatenate([fitted, missed]),
             np.repeat([False, True], [len(fitted), len(missed)]),
             np.append(adjustment.used, np.ones(len(missed), bool)),
+            tolerance_px=self.evidence.tolerance_px,
         )
 
     def require_accepted(self) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..assessment.point_errors import PointErrors
-from ..geometry.judging import FEWEST_CHECK_POINTS, SMALLEST_PX, TOLERANCE_PX, ce90_of_rmse
+from ..geometry.judging import FEWEST_CHECK_POINTS, SMALLEST_PX, ce90_of_rmse
 from ..rasters.grid import FloatArray, Grid
 from ..registration.verdict import Verdict
 from .pictures import data_uri
@@ -74,18 +74,20 @@ def error_reach_px(errors: PointErrors, verdict: Verdict) -> float:
     """
     radius = ce90_of_rmse(verdict.check_rmse_px)
     if math.isfinite(radius):
-        return max(1.6 * radius, 1.5 * TOLERANCE_PX)
-    return float(max(errors.length_px[errors.check].max(initial=0.0), TOLERANCE_PX) * 1.05)
+        return max(1.6 * radius, 1.5 * errors.tolerance_px)
+    return float(max(errors.length_px[errors.check].max(initial=0.0), errors.tolerance_px) * 1.05)
 
 
-def rayleigh_counts(at_px: FloatArray, width_px: float, verdict: Verdict) -> FloatArray:
+def rayleigh_counts(
+    at_px: FloatArray, width_px: float, verdict: Verdict, tolerance_px: float
+) -> FloatArray:
     """Return the check points per bin expected by the verdict's error, at errors, shape (n,).
 
     Lengths of circular normal errors have a Rayleigh distribution; it is scaled to the number of
     check points that agree.
     """
     variance = verdict.check_rmse_px**2 / 2
-    share_agreeing = 1 - math.exp(-(TOLERANCE_PX**2) / (2 * variance))
+    share_agreeing = 1 - math.exp(-(tolerance_px**2) / (2 * variance))
     density = at_px / variance * np.exp(-(at_px**2) / (2 * variance))
     return np.asarray(density * width_px * verdict.check_points_agreeing / share_agreeing)
 
@@ -146,7 +148,7 @@ def error_histogram(errors: PointErrors, verdict: Verdict, metres_per_px: float 
     axes.hist(lengths, edges, color=CHECK_COLOUR, alpha=0.45, edgecolor="white")
     if math.isfinite(verdict.check_rmse_px):
         at = np.linspace(0, reach, 100)
-        expected = rayleigh_counts(at, float(edges[1]), verdict)
+        expected = rayleigh_counts(at, float(edges[1]), verdict, errors.tolerance_px)
         axes.plot(at, expected, color="black", lw=1.5, label="Rayleigh curve of the RMSE")
         radius = ce90_of_rmse(verdict.check_rmse_px)
         axes.axvline(radius, color=FIT_COLOUR, ls="--", lw=1.5, label="90 % of the residuals")

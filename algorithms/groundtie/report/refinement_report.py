@@ -56,6 +56,7 @@ class RefinementReport(Page):
             "warnings": found.heights.warnings(),
             **figures.shown_residuals(residuals, grid),
             **figures.shown_errors(residuals, verdict, evidence.metres_per_px),
+            "tolerance_px": residuals.tolerance_px,
             "grid": grid,
             "pictures": self.comparison,
         }

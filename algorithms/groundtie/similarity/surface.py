@@ -141,7 +141,7 @@ def similarity_surface(
     radius: int,
     settings: SimilaritySettings,
     context: Context | None = None,
-    least_overlap: float = MINIMUM_OVERLAP,
+    least_overlap: float | NDArray[np.floating] = MINIMUM_OVERLAP,
 ) -> Surface:
     """Return similarity over shifts -radius … radius in robust standard deviations.
 
@@ -158,7 +158,8 @@ def similarity_surface(
     context
         Threads for whole scenes; by default the calling thread alone.
     least_overlap
-        Share of the template's valid pixels that must lie on valid ones.
+        Share of the template's valid pixels that must lie on valid ones; one for all, or one for
+        each of a stack, shape (…, 1, 1).
 
     Returns
     -------
