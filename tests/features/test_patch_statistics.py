@@ -72,3 +72,22 @@ def test_nothing_has_no_statistics(name: str) -> None:
     nothing = Patch(np.zeros((9, 9), np.float32), np.zeros((9, 9), bool))
     found = patch_statistics(name, nothing, np.zeros((3, 2)), bands[:, :9, :9])
     assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("name", sorted(STATISTICS))
+def test_what_lies_farther_off_changes_nothing_beside_what_is_masked(name: str) -> None:
+    values = np.random.default_rng(0).normal(100, 5, (120, 400)).astype(np.float32)
+    values[:, 200:] += 300  # bright land
+    valid = np.ones(values.shape, bool)
+    valid[:, 60:75] = False
+    found = [
+        patch_statistics(
+            name,
+            Patch(values[:, :width], valid[:, :width]),
+            np.array([[45.0, 60.0]]),
+            values[None, :, :width],
+        )
+        for width in (120, 400)
+    ]
+    # Skewness loses digits with the grey value that all are centred on.
+    np.testing.assert_allclose(*found, rtol=1e-4)

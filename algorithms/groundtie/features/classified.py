@@ -12,12 +12,11 @@ from ..masks.scene import Scene, Selection
 from ..rasters.grid import mesh
 from ..rasters.reading import FloatImage, Mask, Window
 from .classifier import FeatureClassifier
-from .patch_statistics import NO_BANDS, PATCH_PX
+from .hog import PATCH_PX
+from .patch_statistics import NO_BANDS, REACH_PX
 
 # Side of the cells whose pixels are decided together; it is small against the side of a patch.
 _CELL_PX = 8
-
-_MARGIN_PX = PATCH_PX // 2
 
 # A patch is left out if a quarter of it is to be, that is, up to this distance beside content to
 # be left out. The masked area is therefore shrunk by this.
@@ -56,10 +55,10 @@ class ClassifiedScene:
         """Return the pixels whose surroundings the classifier keeps, and the valid pixels."""
         cells = window.aligned(_CELL_PX)
         across, down = cells.width // _CELL_PX, cells.height // _CELL_PX
-        around = cells.widened(_MARGIN_PX)
+        around = cells.widened(REACH_PX)
         patch = self.scene.read(around)
         bands = self.bands(around) if self.classifier.bands else NO_BANDS
-        middles = _MARGIN_PX + _CELL_PX * (mesh(np.arange(across), np.arange(down)) + 0.5)
+        middles = REACH_PX + _CELL_PX * (mesh(np.arange(across), np.arange(down)) + 0.5)
         kept = self.classifier.keep(patch, middles, bands).reshape(down, across)
         pixels = kept.repeat(_CELL_PX, axis=0).repeat(_CELL_PX, axis=1)
         return pixels[window.slices_in(cells)], patch.valid[window.slices_in(around)]

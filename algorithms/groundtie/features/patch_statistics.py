@@ -15,8 +15,11 @@ from .hog import PATCH_PX
 
 Means = Callable[[FloatArray], FloatArray]
 
-# Side of the window whose mean separates texture from coarser structure.
+# Side of the window whose mean separates texture from coarser structure; gradients reach less far.
 _FINE_PX = 5
+
+# Pixels of the image that statistics need around a position.
+REACH_PX = PATCH_PX // 2 + _FINE_PX // 2
 
 
 def _mean_and_variance(values: FloatArray, bands: FloatImage, means: Means) -> list[FloatArray]:
@@ -81,6 +84,10 @@ def patch_statistics(
     # Grey values are centred, so that their powers lose no digits.
     centre = float(window.values[window.valid].mean())
     values = np.where(window.valid, window.values - centre, 0.0)
+    # What texture sees beside valid pixels must not depend on what else the window holds.
+    near = window_sums(window.valid.astype(np.float64), _FINE_PX)
+    around = window_sums(values, _FINE_PX) / np.maximum(near, 1)
+    values = np.where(window.valid, values, around)
     counts = window_sums(window.valid.astype(np.float64), PATCH_PX)
 
     def means(of: FloatArray) -> FloatArray:
