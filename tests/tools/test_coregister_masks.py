@@ -17,8 +17,11 @@ from scipy.ndimage import gaussian_filter
 from specified_runs import register_specified
 from tools.conftest import SimulatedFiles
 
+from benchmarks.attempt import on_pixels
+from benchmarks.cases import draw_shift, read_cases, search_radius_m, write_case
 from groundtie import Raster
 from groundtie.errors import NotRegisteredError
+from groundtie.rasters.reading import open_raster
 from groundtie.registration.specification import COREGISTER
 from groundtie.tools.coregister import coregister
 from groundtie.tools.filter_speckle import filter_speckle
@@ -152,3 +155,22 @@ def test_a_mask_that_leaves_a_fifth_counts_on_either_image(tool: Callable[..., A
             px = found.pair.reference.source.grid.map_to_pixel(xy)
             assert np.abs(found.transform(xy) - (px - [right, down])).max() < 0.3
             assert found.survey.confirming > 0.9 * len(found.survey.centres)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["reference", "input"])
+def test_a_fifth_of_either_image_of_a_real_pair_is_enough(
+    real_data: Path, tmp_path: Path, where: str
+) -> None:
+    (case,) = (case for case in read_cases(real_data) if case.name == "oo-lakes")
+    pair = write_case(case, draw_shift(case, 20.0, 0), tmp_path)
+    with open_raster(getattr(pair, where)) as source:
+        grid = source.grid
+    cover = gaussian_filter(np.random.default_rng(3).normal(size=grid.size[::-1]), 8)
+    mask = Raster((cover > np.quantile(cover, 0.8)).astype(np.uint8), grid.transform, grid.crs)
+    masks = {f"{where}_mask": mask}
+    with coregister(
+        pair.reference, pair.input, search_radius=search_radius_m(20.0), **masks
+    ) as one:
+        assert pair.truth is not None
+        assert pair.truth.error_px(on_pixels(one.transform, pair.reference)) < 1.0
