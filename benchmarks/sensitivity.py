@@ -27,7 +27,7 @@ from .suites import Settings, SuiteResult, Table, by_group, none_wrong, run_case
 USUAL = "as it is"
 
 # One of so many real pairs, and the simulated ones.
-_EVERY, _SIZE_PX, _DENSITIES = 3, 500, ("rural", "suburban")
+_EVERY, _SIZE_PX, _DENSITIES = 5, 500, ("rural", "suburban")
 
 
 @dataclass(frozen=True)
