@@ -86,7 +86,8 @@ CONSTANTS = (
     Constant("matching.pyramid", "_RIVAL_EVIDENCE", 0.25, 0.75),
     Constant("matching.pyramid", "_RADIUS_PX", 6, 24),
     Constant("matching.pyramid", "_LEVEL_ERROR_PX", 1.0, 4.0),
-    Constant("matching.pyramid", "_DISTORTION_PX", 2, 8),
+    # With more, the search radius of tie points never covers the error of a level.
+    Constant("matching.pyramid", "_DISTORTION_PX", 2, 6),
     Constant("matching.pyramid", "_STEP", 2.0, 8.0),
     Constant("matching.chips", "_LEAST_VALID", 0.2, 0.6),
     Constant("matching.chips", "_FAR_PX", 1.25, 5.0),
