@@ -85,10 +85,10 @@ def patch_statistics(
     centre = float(window.values[window.valid].mean())
     values = np.where(window.valid, window.values - centre, 0.0)
     # What texture sees beside valid pixels must not depend on what else the window holds.
-    near = window_sums(window.valid.astype(np.float64), _FINE_PX)
-    around = window_sums(values, _FINE_PX) / np.maximum(near, 1)
+    ones = window.valid.astype(np.float64)
+    around = window_sums(values, _FINE_PX) / np.maximum(window_sums(ones, _FINE_PX), 1)
     values = np.where(window.valid, values, around)
-    counts = window_sums(window.valid.astype(np.float64), PATCH_PX)
+    counts = window_sums(ones, PATCH_PX)
 
     def means(of: FloatArray) -> FloatArray:
         sums = window_sums(np.where(window.valid, of, 0.0).astype(np.float64), PATCH_PX)

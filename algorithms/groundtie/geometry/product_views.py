@@ -7,6 +7,7 @@ ground.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -45,6 +46,11 @@ _LARGEST_BYTES = 100_000_000
 
 def metadata_beside(image: Path) -> Iterator[Path]:
     """Yield the files beside an image that may hold metadata, by the products' naming schemes."""
+    # Names that are too long are none: `Path.is_file` would raise.
+    yield from filter(os.path.isfile, _names_beside(image))
+
+
+def _names_beside(image: Path) -> Iterator[Path]:
     folder, stem = image.parent, image.stem
     yield folder / f"{stem}_extended.json"  # Capella
     yield folder / f"{re.sub('_(GEC|SICD|MM)$', '', stem)}_METADATA.json"  # Umbra

@@ -137,12 +137,12 @@ def read_tie_points(
             points = read_georeferencer(path, input_grid)
             return replace(points, more={name: np.full(len(points), np.nan) for name in more})
         rows, ends, layer_crs = _read_rows(path, suffix)
-        usual_crs = table_crs or input_grid.crs
-        if suffix == ".gpkg" or (suffix == ".geojson" and input_grid.crs is None):
-            usual_crs = layer_crs
-        elif suffix == ".geojson":
-            usual_crs = input_grid.crs
-        crs = _map_crs(rows, usual_crs, empty_is_none=suffix != ".gpkg")
+        usual_crs = {
+            ".gpkg": layer_crs,
+            ".geojson": input_grid.crs or layer_crs,
+            ".csv": table_crs or input_grid.crs,
+        }
+        crs = _map_crs(rows, usual_crs[suffix], empty_is_none=suffix != ".gpkg")
         rows, edited = follow_lines(rows, ends, layer_crs, crs, input_grid)
         if edited.any():
             _LOG.info("%s: %d of %d lines were moved or drawn", path, edited.sum(), len(rows))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -93,7 +92,7 @@ class View:
             return None
         if _is_item(beside := _item_beside(Path(image))):
             return read_view(beside)
-        of_product = map(_product_view, filter(os.path.isfile, metadata_beside(Path(image))))
+        of_product = map(_product_view, metadata_beside(Path(image)))
         return next((view for view in of_product if view is not None), None)
 
 
@@ -116,8 +115,7 @@ def files_beside(image: Path) -> Iterator[Path]:
     """Yield the files beside an image that may state its view: STAC item, product's metadata."""
     if _is_item(item := _item_beside(image)):
         yield item
-    # Names that are too long are none: `Path.is_file` would raise.
-    yield from filter(os.path.isfile, metadata_beside(image))
+    yield from metadata_beside(image)
 
 
 def _item_beside(image: Path) -> Path:

@@ -18,7 +18,6 @@ from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX, Description
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import (
-    MINIMUM_OVERLAP,
     SimilaritySettings,
     Surface,
     describe,
@@ -148,11 +147,10 @@ class ChipMatcher:
         windows = ChipWindows(images, places, reach, self.held_out)
 
         def of_chips(chips: Description, search: Description, is_masked: bool) -> Surface:
-            least: float | NDArray[np.floating] = MINIMUM_OVERLAP
-            if is_masked:  # a chip can only overlap with what the mask leaves
-                least = least * search.patch.valid.mean(axis=(-2, -1), keepdims=True)
+            valid = search.patch.valid
+            share = valid.mean(axis=(-2, -1), keepdims=True) if is_masked else 1.0
             return similarity_surface(
-                chips.inner(radius_px), search, radius_px, self.settings, least_overlap=least
+                chips.inner(radius_px), search, radius_px, self.settings, searched_share=share
             )
 
         masked = [image.mask is not None for image in (self.pair.reference, self.pair.input)]

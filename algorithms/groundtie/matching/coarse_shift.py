@@ -175,9 +175,7 @@ def level_surface(
     valid = 1.0 if pair.input.mask is None else input.valid_share
     template = describe(reference, level.width * level.height, settings, context.memo)
     search = describe(input, level.width * level.height, settings)
-    surface = similarity_surface(
-        template, search, radius_px, settings, context.quiet(), MINIMUM_OVERLAP * valid
-    )
+    surface = similarity_surface(template, search, radius_px, settings, context.quiet(), valid)
     return surface, partial(overlap_share, template.patch, search.patch)
 
 

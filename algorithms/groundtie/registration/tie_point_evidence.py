@@ -20,7 +20,7 @@ from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
 from .evidence import TIE_POINTS
 
-# Models that neither mirror nor, the first two, scale.
+# Models that do not mirror.
 _SHAPES = ("translation", "rigid", "similarity")
 
 
@@ -152,7 +152,7 @@ class TiePointEvidence:
             return math.inf
         frame = Frame.around(places)
         uv, border = frame.enter(places), frame.enter(self.input_grid.outline())
-        if self.kind in _SHAPES[1:]:
+        if self.kind in ("rigid", "similarity"):
             design, at = (np.column_stack([np.ones(len(p)), p @ [1, 1j]]) for p in (uv, border))
         else:
             design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))

@@ -141,7 +141,7 @@ def similarity_surface(
     radius: int,
     settings: SimilaritySettings,
     context: Context | None = None,
-    least_overlap: float | NDArray[np.floating] = MINIMUM_OVERLAP,
+    searched_share: float | NDArray[np.floating] = 1.0,
 ) -> Surface:
     """Return similarity over shifts -radius … radius in robust standard deviations.
 
@@ -157,9 +157,9 @@ def similarity_surface(
         Settings of the measurement.
     context
         Threads for whole scenes; by default the calling thread alone.
-    least_overlap
-        Share of the template's valid pixels that must lie on valid ones; one for all, or one for
-        each of a stack, shape (…, 1, 1).
+    searched_share
+        Share of the search window that a mask leaves, for all or for each of a stack, shape
+        (…, 1, 1): a template can lie on no more valid pixels. Without a mask, 1.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def similarity_surface(
     shape = *template.patch.values.shape[:-2], 2 * radius + 1, 2 * radius + 1
     total, known = np.zeros(shape, np.float32), None
     if not (template.patch.all_valid and search.patch.all_valid):
-        known = overlap_share(template.patch, search.patch) >= least_overlap
+        known = overlap_share(template.patch, search.patch) >= MINIMUM_OVERLAP * searched_share
     for name in settings.measures:
         values = MEASURES[name](template, search, context)
         weight = np.float32(_WEIGHTS.get(name, 1.0))
