@@ -8,6 +8,7 @@ from ..errors import TooFewPointsError
 from ..rasters.grid import FloatArray
 from .models import (
     DEGREE,
+    SHAPE_PRESERVING,
     Frame,
     Model,
     PolynomialModel,
@@ -62,7 +63,7 @@ def fit_model(
     uv, nominal_uv, weights = frame.enter(xy[taken]), frame.enter(nominal_xy[taken]), weights[taken]
     if kind == "tps":
         return _fit_thin_plate(frame, uv, nominal_uv - uv, weights)
-    if kind in ("rigid", "similarity"):
+    if kind in SHAPE_PRESERVING:
         coefficients = _fit_similarity(uv, nominal_uv, weights, scaled=kind == "similarity")
     else:
         coefficients = _solve(monomials(uv, DEGREE[kind]), nominal_uv - uv, weights)
@@ -90,7 +91,7 @@ def require_determined(kind: str, xy: FloatArray) -> None:
     uv = Frame.around(xy).enter(xy)
     if not uv.any():
         raise TooFewPointsError(f"the {kind} model needs points that do not all lie at one place")
-    if kind not in ("rigid", "similarity") and _is_deficient(monomials(uv, degree)):
+    if kind not in SHAPE_PRESERVING and _is_deficient(monomials(uv, degree)):
         where = "a line" if degree == 1 else f"a curve of degree {degree}"
         raise TooFewPointsError(f"the {kind} model needs points that do not all lie on {where}")
 

@@ -43,6 +43,8 @@ PARAMETERS = {
     "tps": 20,
     TERRAIN: 8,
 }
+# Models whose linear part is a rotation, and a scale.
+SHAPE_PRESERVING = ("rigid", "similarity")
 # Models of the plane alone.
 KINDS = tuple(kind for kind in PARAMETERS if kind != TERRAIN)
 

@@ -8,7 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import TooFewPointsError
-from ..geometry.models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, monomials
+from ..geometry.models import (
+    DEGREE,
+    SHAPE_PRESERVING,
+    TERRAIN,
+    Frame,
+    Model,
+    PolynomialModel,
+    monomials,
+)
 from ..geometry.rows import Rows
 from ..geometry.terrain import Terrain
 from ..geometry.terrain_model import TerrainModel
@@ -73,7 +81,7 @@ class Family(Rows):
         kind, px = self.kind, self.px
         target = (start(px) - px) / self.frame.to_map.a
         coefficients = np.linalg.lstsq(self.design, target, rcond=None)[0]
-        if kind not in ("rigid", "similarity"):
+        if kind not in SHAPE_PRESERVING:
             return np.asarray(coefficients.ravel())
         growth = (coefficients[1, 0] + coefficients[2, 1]) / 2
         turn = (coefficients[1, 1] - coefficients[2, 0]) / 2

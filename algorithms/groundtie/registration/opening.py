@@ -8,7 +8,11 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..context import Context
+from ..errors import ParameterError
+from ..geometry.models import SHAPE_PRESERVING
 from ..geometry.terrain import Terrain
 from ..masks.used import MaskUsed
 from ..rasters.grid import Grid
@@ -18,6 +22,10 @@ from ..rasters.rendered import rendered
 from .specification import FreeSearch, Specification
 from .surface_masks import rendered_surface
 from .user_masks import with_user_masks
+
+# By how much the axes of pixels may differ if a model preserves shapes in pixels: rotated by 1°,
+# positions 500 px from the centre are then wrong by less than half a pixel.
+_SQUARE = 1.05
 
 
 @dataclass(frozen=True)
@@ -110,6 +118,7 @@ def pair_images(
         0.0 if rotation_deg is None else rotation_deg,
         1.0 if scale is None else scale,
     )
+    _require_square(spec.model, images.grid)
     reach_m = images.limits.radius
     if radius_m is not None and radius_m > reach_m:
         unit = "m" if grid.is_georeferenced else "px"
@@ -123,6 +132,19 @@ def pair_images(
         context.update(0.0, note)
     pair, used = with_user_masks(images, masks, stack, context.part(0.0, 0.02))
     return OpenPair(images, pair, used, stack, started)
+
+
+def _require_square(kind: str, grid: Grid) -> None:
+    """Refuse a model that preserves shapes in pixels whose shapes are not those on the ground."""
+    if kind not in SHAPE_PRESERVING:
+        return
+    linear = np.reshape([*grid.transform][:6], (2, 3))[:, :2]
+    longer, shorter = np.linalg.svd(np.diag(grid.metres_per_unit) @ linear, compute_uv=False)
+    if longer > _SQUARE * shorter:
+        raise ParameterError(
+            f"the {kind} model preserves shapes in pixels, and the reference's are "
+            f"{longer / shorter:.3g} times as long as wide on the ground: give model affine"
+        )
 
 
 def usual_radius_m(reference: Grid, input: Grid, free: FreeSearch) -> float:

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from ..errors import ParameterError, TooFewPointsError
 from ..geometry.chance import log10_least_false_alarms
 from ..geometry.fitting import ROUNDING, fit_model
-from ..geometry.models import DEGREE, Frame, fewest_points, monomials
+from ..geometry.models import DEGREE, SHAPE_PRESERVING, Frame, fewest_points, monomials
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
 from .evidence import TIE_POINTS
 
 # Models that do not mirror.
-_SHAPES = ("translation", "rigid", "similarity")
+_SHAPES = ("translation", *SHAPE_PRESERVING)
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class TiePointEvidence:
             return math.inf
         frame = Frame.around(places)
         uv, border = frame.enter(places), frame.enter(self.input_grid.outline())
-        if self.kind in ("rigid", "similarity"):
+        if self.kind in SHAPE_PRESERVING:
             design, at = (np.column_stack([np.ones(len(p)), p @ [1, 1j]]) for p in (uv, border))
         else:
             design, at = (monomials(p, DEGREE[self.judged_by]) for p in (uv, border))
