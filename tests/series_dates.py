@@ -34,14 +34,17 @@ def link(
     first: int,
     second: int,
     truth: FloatArray,
-    sigma_px: float,
+    sigma_px: float | FloatArray,
     error: FloatArray | None = None,
 ) -> Link:
-    """Return the link of two dates by their true displacements (n, 6), and an error of it."""
+    """Return the link of two dates by their true displacements (n, 6), and an error of it.
+
+    Its standard deviation is that of all six parameters, or of each.
+    """
     matrices = [FRAME.matrix(truth[date]) for date in (first, second)]
     between = FRAME.of_matrix(matrices[1] @ np.linalg.inv(matrices[0]))
     wrong = np.zeros(6) if error is None else error
-    return Link(first, second, between + wrong, sigma_px**2 * np.eye(6))
+    return Link(first, second, between + wrong, np.square(sigma_px) * np.eye(6))
 
 
 def star_and_chain(count: int) -> list[tuple[int, int]]:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.judging import SIGNIFICANCE
 from ..rasters.grid import FloatArray
 from .frame import PARAMETERS, SeriesFrame, rms_px, sigma_px
-from .network import Link, largest_statistic
+from .network import Link, exceeded_by
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,8 @@ def triplet_closures(
     for link in links:
         partners.setdefault(link.first, set()).add(link.second)
         partners.setdefault(link.second, set()).add(link.first)
-    largest = largest_statistic(links)
     found = [
-        _closure(frame, by_ends, (a, b, c), scatter_px, largest)
+        _closure(frame, by_ends, (a, b, c), scatter_px)
         for a, b in sorted(map(sorted, by_ends))
         for c in sorted(partners[a] & partners[b])
         if c > b
@@ -71,15 +71,16 @@ def _closure(
     by_ends: dict[frozenset[int], Link],
     dates: tuple[int, int, int],
     scatter_px: float,
-    largest: float,
 ) -> Closure:
     around = np.eye(3)
     covariance = 3 * scatter_px**2 * np.eye(PARAMETERS)
-    for start, end in zip(dates, (*dates[1:], dates[0]), strict=True):
-        link = by_ends[frozenset((start, end))]
+    ends = list(zip(dates, (*dates[1:], dates[0]), strict=True))
+    links = [by_ends[frozenset(pair)] for pair in ends]
+    for link, (start, _) in zip(links, ends, strict=True):
         matrix = frame.matrix(link.displacement)
         around = (matrix if link.first == start else np.linalg.inv(matrix)) @ around
         covariance = covariance + link.covariance
     miss: FloatArray = frame.of_matrix(around)
     statistic = float(miss @ np.linalg.solve(covariance, miss))
-    return Closure(dates, rms_px(miss), sigma_px(covariance), statistic, statistic <= largest)
+    is_closed = statistic <= exceeded_by(SIGNIFICANCE, links).max()
+    return Closure(dates, rms_px(miss), sigma_px(covariance), statistic, bool(is_closed))

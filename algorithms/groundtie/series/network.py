@@ -20,7 +20,7 @@ from scipy.special import chdtri  # scipy.stats takes 0.4 s to import
 from ..geometry.judging import SIGNIFICANCE
 from ..rasters.grid import FloatArray
 from ..rasters.reading import Mask
-from .frame import PARAMETERS, ROUNDING_PX, SeriesFrame, sigma_px
+from .frame import PARAMETERS, SeriesFrame, sigma_px
 
 # Largest offset of dates from each other, in pixels.
 _GOAL_PX = 0.3
@@ -29,6 +29,11 @@ _GOAL_PX = 0.3
 # shadows and tides displace all points alike. It is estimated from the residuals, between the
 # scatter of the best links (suite series) and the goal; a network that needs more is wrong.
 SCATTER_RANGE_PX = (0.03, _GOAL_PX)
+
+# Of a shift, the change over the frame is this share as uncertain, or less: two UTM zones rotate by
+# 3° or so against each other, and by 0.2° more or less over 20 km. An affine transform's is about
+# as uncertain.
+_OF_SHIFT = 0.01
 
 # Links of smaller redundancy are not tested.
 _LEAST_REDUNDANCY = 0.01
@@ -61,16 +66,19 @@ class Link:
     displacement: FloatArray
     covariance: FloatArray
 
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of parameters that were fitted: two of a shift, else six.
 
-def degrees_of_freedom(links: Sequence[Link]) -> int:
-    """Return the number of parameters in which links can differ: two of shifts alone, else six."""
-    is_shift = all(np.abs(link.displacement[2:]).max() < ROUNDING_PX for link in links)
-    return 2 if is_shift else PARAMETERS
+        Between maps, a shift may change over the frame, but is as certain everywhere.
+        """
+        variances = np.diag(self.covariance)
+        return 2 if variances[2:].max() <= _OF_SHIFT**2 * variances[:2].max() else PARAMETERS
 
 
-def largest_statistic(links: Sequence[Link]) -> float:
-    """Return the squared normalised length that links exceed by chance once in a thousand times."""
-    return float(chdtri(degrees_of_freedom(links), SIGNIFICANCE))
+def exceeded_by(share: float, links: Sequence[Link]) -> FloatArray:
+    """Return the squared normalised length that a share of each link's kind exceeds by chance."""
+    return np.asarray(chdtri([link.degrees_of_freedom for link in links], share))
 
 
 @dataclass(frozen=True)
@@ -131,13 +139,12 @@ def adjust(
         Whether the mean displacement of all dates is zero instead.
     """
     kept = np.array([True] * len(links), bool)
-    largest = largest_statistic(links)
     while True:
         kept &= _reached(links, kept, count, hub)
         network = _Network(frame, list(compress(links, kept)), count, hub)
         solution = network.settled()
-        found = network.statistics(solution)
-        if not np.any(found > largest):
+        found = network.statistics(solution) / exceeded_by(SIGNIFICANCE, network.links)
+        if not np.any(found > 1):
             break
         kept[np.flatnonzero(kept)[np.nanargmax(found)]] = False
     displacements, covariances = solution.of_dates(frame, is_free)
@@ -192,11 +199,11 @@ class _Network:
     def settled(self) -> _Solution:
         """Return the solution with the scatter at which the median statistic is as expected."""
         low, high = SCATTER_RANGE_PX
-        median = float(chdtri(degrees_of_freedom(self.links), 0.5))
+        median = exceeded_by(0.5, self.links)
 
         def is_enough(scatter_px: float) -> bool:
-            found = self.statistics(self.solve(scatter_px))
-            return not np.isfinite(found).any() or bool(np.nanmedian(found) <= median)
+            found = self.statistics(self.solve(scatter_px)) / median
+            return not np.isfinite(found).any() or bool(np.nanmedian(found) <= 1)
 
         if is_enough(low):
             return self.solve(low)
@@ -238,7 +245,8 @@ class _Network:
     def statistics(self, solution: _Solution) -> FloatArray:
         """Return the squared normalised residual of each link that is used, shape (links,).
 
-        It has a χ² distribution of `degrees_of_freedom`; NaN where no other link controls it.
+        It has a χ² distribution of the link's degrees of freedom; NaN where no other link controls
+        it.
         """
         blocks = solution.covariance
         found = []
