@@ -24,6 +24,7 @@ from groundtie.rasters.reading import open_raster
 
 RNG = np.random.default_rng(0)
 GRID = utm_grid(90, 70)
+OF_ALPHA = [ColorInterp.gray, ColorInterp.alpha]
 IMAGE = RNG.integers(1, 1000, (70, 90)).astype(np.uint16)
 
 
@@ -223,6 +224,19 @@ def test_alpha_stays_alpha(small_tiles: None, tmp_path: Path) -> None:
     # their neighbours.
     np.testing.assert_array_equal(values[3, :, 10:], alpha)
     assert not values[:3, :, 10:][:, alpha == 0].any()
+
+
+def test_nan_below_an_opaque_alpha_band_stays_no_data(tmp_path: Path) -> None:
+    values = np.full((2, 70, 90), 255, np.float32)
+    values[0] = IMAGE
+    values[0, 20:40, 30:60] = np.nan
+    values[1, 50:] = 0
+    path = write_raster(tmp_path / "a.tif", values, GRID, colorinterp=OF_ALPHA)
+    source, out = open_raster(path), open_raster(warped(path, d=(2.0, 1.0)))
+    # Nearest pixels are the same: 0.2 px is less than a half.
+    found, expected = (one.read(one.window, 1)[1] for one in (out, source))
+    np.testing.assert_array_equal(found, expected)
+    assert expected.sum() == 50 * 90 - 20 * 30
 
 
 def test_larger_pixels_are_means(tmp_path: Path) -> None:

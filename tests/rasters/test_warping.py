@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from raster_files import utm_grid, wave_image, waves, write_raster
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose
-from groundtie.rasters.lattice import coordinates, lattice
+from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, apply_affine, compose, reproject
+from groundtie.rasters.lattice import NOWHERE, coordinates, lattice
 from groundtie.rasters.metadata import rounded
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.rasters.warping import METHODS, reduction, resample, sample, source_window
@@ -262,6 +262,36 @@ def test_the_source_window_holds_the_kernel_and_starts_at_multiples() -> None:
     assert row + height > 8 + 9
     far = source_window(px + 1000, (100, 100), "cubic")
     assert far.width == far.height == 0
+
+
+def test_reduction_is_that_where_the_input_is_seen() -> None:
+    """A tenth of a grid shows it, far from its centre; elsewhere positions are unknown."""
+    image = utm_grid(400, 400, 10.0)
+    wide = utm_grid(4000, 100, 40.0)
+
+    def to_px(xy: np.ndarray) -> np.ndarray:
+        px = image.map_to_pixel(xy)
+        return np.where(px[:, :1] < 1000, px, np.nan)
+
+    assert reduction(wide, to_px, image.size) == (4, 4)
+
+
+def test_reduction_of_a_small_input_on_a_map_of_the_world() -> None:
+    """At 60° a hundredth of a degree is 557 m of longitude, and 1114 m of latitude."""
+    world = Grid(Affine(0.01, 0, -180, 0, -0.01, 90), CRS.from_epsg(4326), 36000, 18000)
+    centre = reproject(np.array([[15.0, 60.0]]), world.crs, CRS.from_epsg(32633))[0]
+    place = Affine(100, 0, centre[0] - 50_000, 0, -100, centre[1] + 50_000)
+    image = Grid(place, CRS.from_epsg(32633), 1000, 1000)
+    assert reduction(world, world.to_pixels_of(image), image.size) == (6, 11)
+
+
+def test_the_source_window_ignores_unknown_positions() -> None:
+    px = np.mgrid[:20, :30][::-1] + 20_000.0
+    known = source_window(px, (40_000, 40_000), "cubic", (2, 2))
+    px[:, 3, 4] = NOWHERE
+    px[:, 5, 6] = [-5000, 20_010]
+    assert source_window(px, (40_000, 40_000), "cubic", (2, 2)) == known
+    assert source_window(px * 0 + NOWHERE, (40_000, 40_000), "cubic")[2:] == (0, 0)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.21, 0.5, 0.79])

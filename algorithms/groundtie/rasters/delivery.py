@@ -132,9 +132,9 @@ def warp_raster(
 
     Memory is bounded: tiles are read, resampled and written one by one. Bands, dtype, colours,
     names and metadata are kept (see `writing.create_like`). Pixels without data get the input's
-    nodata value, or a transparent alpha band if the input has one. Otherwise they are NaN in real
-    floating-point rasters, and 0 with an internal mask in all others. An input's mask band becomes
-    an internal mask. Rasters with a palette are always resampled by `nearest`.
+    nodata value, by default NaN in real floating-point rasters, and are transparent in an alpha
+    band. Without either they are 0 with an internal mask. An input's mask band becomes an internal
+    mask. Rasters with a palette are always resampled by `nearest`.
 
     Parameters
     ----------

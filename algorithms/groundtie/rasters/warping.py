@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .grid import FloatArray, Grid, PointFunction
+from .grid import FloatArray, Grid, PointFunction, mesh
 from .kernels import REACH, interpolate
 from .lattice import ON_PIXELS, DenseMap, lattice, row_strips
 from .metadata import rounded, working_dtype
@@ -22,6 +22,10 @@ METHODS = tuple(REACH)
 # this number in double precision rounds to such multiples.
 _SINGLE_PX = 2000
 _ROUNDING = 1.5 * 2.0**39
+
+# Pixels along each side of a grid at which an input is looked for, until one shows it: a million
+# positions take 0.1 s.
+_SEEN_AT = (1, 32, 1024)
 
 # Reads values and validity, ([bands,] h, w), of a window, averaged to a shape if one is given.
 Read = Callable[[Window, tuple[int, int] | None], tuple[NDArray[Any], Mask]]
@@ -136,11 +140,12 @@ def are_inside(px: NDArray[Any], shape: tuple[int, ...], margin: int) -> bool:
 
 
 def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> tuple[int, int]:
-    """Return how many input columns and rows a pixel at the grid's centre spans, rounded, >= 1.
+    """Return how many input columns and rows a pixel of a grid spans, rounded, >= 1.
 
-    The result is no more than the input's width and height, `size`.
+    It is the pixel at the grid's centre, unless the input, of width and height `size`, is seen at
+    others only. The result is no more than that size.
     """
-    col, row = grid.centre_px
+    col, row = _seen_pixel(grid, to_input_px, size)
     span = _span(grid, to_input_px, col, row)
     if not np.isfinite(span).all():
         return 1, 1
@@ -151,6 +156,26 @@ def reduction(grid: Grid, to_input_px: PointFunction, size: tuple[int, int]) -> 
         max(round(min(float(length), most)), 1) for length, most in zip(span, size, strict=True)
     )
     return cols, rows
+
+
+def _seen_pixel(
+    grid: Grid, to_input_px: PointFunction, size: tuple[int, int]
+) -> tuple[float, float]:
+    """Return the position of a pixel at which a grid shows an input; its centre if none is found.
+
+    Of the pixels that are found it is the one in their middle.
+    """
+    for count in _SEEN_AT:
+        shares = (np.arange(count) + 0.5) / count
+        places = mesh(*(shares * side - 0.5 for side in grid.size))
+        with np.errstate(invalid="ignore"):
+            inside = lies_inside(to_input_px(grid.pixel_to_map(places)).T, *size, -0.5)
+        if inside.any():
+            seen = places[inside]
+            off = seen - seen.mean(axis=0)
+            col, row = seen[(off**2).sum(axis=1).argmin()]
+            return float(col), float(row)
+    return grid.centre_px
 
 
 def _span(grid: Grid, to_input_px: PointFunction, col: float, row: float) -> FloatArray:
@@ -178,15 +203,29 @@ def source_window(
         Columns and rows averaged beforehand: the window starts and ends at multiples of them. It
         may extend beyond the image by the kernel's reach, and may be empty.
     """
+    margins = [(REACH[method] + 1) * step for step in factor]
+    seen = px.reshape(2, -1)
+    if not are_inside(px, size[::-1], 0):
+        # Positions beyond the image, among them unknown ones, need none of its pixels.
+        seen = seen[:, _are_near(seen, size, margins)]
+        if not seen.size:
+            return Window(0, 0, 0, 0)
     bounds = []
-    for axis in (0, 1):
-        margin = (REACH[method] + 1) * factor[axis]
-        low = max(float(px[axis].min()) - margin, -margin)
-        high = min(float(px[axis].max()) + margin, size[axis] + margin)
-        first = int(np.floor(low / factor[axis])) * factor[axis]
-        stop = int(np.ceil((high + 1) / factor[axis])) * factor[axis]
+    for axis, margin, side, step in zip(seen, margins, size, factor, strict=True):
+        low = max(float(axis.min()) - margin, -margin)
+        high = min(float(axis.max()) + margin, side + margin)
+        first = int(np.floor(low / step)) * step
+        stop = int(np.ceil((high + 1) / step)) * step
         bounds.append((first, max(stop - first, 0)))
     return Window(bounds[0][0], bounds[1][0], bounds[0][1], bounds[1][1])
+
+
+def _are_near(px: FloatArray, size: tuple[int, int], margins: Sequence[int]) -> Mask:
+    """Return which positions, (2, n), lie in an image, or within margins around it."""
+    near = np.ones(px.shape[1], bool)
+    for axis, side, margin in zip(px, size, margins, strict=True):
+        near &= (axis >= -margin) & (axis <= side - 1 + margin)
+    return near
 
 
 def sample(

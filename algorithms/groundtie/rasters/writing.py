@@ -271,11 +271,11 @@ def shared_nodata(source: RasterSource) -> float | None:
 def chosen_nodata(source: RasterSource) -> float | None:
     """Return the nodata value for a raster's new pixels, or None.
 
-    It is the declared value; for real floating-point pixels without declaration, alpha band or
-    mask, it is NaN. Errors as `shared_nodata`.
+    It is the declared value; for real floating-point pixels without declaration or mask, it is NaN,
+    as they may be NaN where an alpha band is opaque. Errors as `shared_nodata`.
     """
     declared = shared_nodata(source)
-    if declared is not None or source.alpha_band or source.has_mask_band:
+    if declared is not None or source.has_mask_band:
         return declared
     return float("nan") if source.dtype.kind == "f" else None
 
