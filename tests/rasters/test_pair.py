@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from groundtie.errors import (
     SameFileError,
 )
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
-from groundtie.rasters.pair import Image, ImagePair, default_radius_m, make_pair
+from groundtie.rasters.pair import Image, ImagePair, coarser_m, default_radius_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
 
@@ -194,15 +195,40 @@ def test_a_pixel_size_between_those_of_both_images(files: Files) -> None:
 
 
 @pytest.mark.parametrize(
-    ("grid", "radius"),
+    ("pixel_m", "is_on_map", "radius"),
+    [(1.0, True, 100.0), (10.0, True, 200.0), (1.0, False, 20.0)],
+)
+def test_the_default_search_radius(pixel_m: float, is_on_map: bool, radius: float) -> None:
+    assert default_radius_m(pixel_m, is_on_map) == pytest.approx(radius)
+
+
+@pytest.mark.parametrize(
+    ("epsg", "pixel", "sides_m"),
     [
-        (utm_grid(9, 9, 1.0), 100.0),
-        (utm_grid(9, 9, 10.0), 200.0),
-        (Grid(PIXEL_COORDINATES, None, 9, 9), 20.0),
+        # At 60° north, a metre of Web Mercator is 0.50 m, and a degree 55.8 by 111.4 km.
+        (3857, 20.0, (10.0, 10.0)),
+        (4326, 1e-4, (7.07, 14.13)),
     ],
 )
-def test_the_default_search_radius(grid: Grid, radius: float) -> None:
-    assert default_radius_m(grid) == pytest.approx(radius)
+def test_metres_are_those_where_the_images_overlap(
+    files: Files, epsg: int, pixel: float, sides_m: tuple[float, float]
+) -> None:
+    """The scale at the centre of a map of the world, which is the equator, is another one."""
+    size = 4e7 if epsg == 3857 else 360.0
+    count = int(size / pixel)
+    place = Affine(pixel, 0, -size / 2, 0, -pixel, size / 2 if epsg == 3857 else size / 4)
+    world = Grid(place, CRS.from_epsg(epsg), count, count if epsg == 3857 else count // 2)
+    part = Grid(Affine(10, 0, 450_000, 0, -10, 6_660_000), NEXT_ZONE, 500, 400)
+    input = files.image(part)
+    source = files.open(np.ones((4, 4), np.uint8))
+    pair = make_pair(Image(replace(source, grid=world)), input, search_radius_m=500.0)
+    assert pair.grid.pixel_sides_m == pytest.approx(sides_m, rel=0.01)
+    assert pair.limits.radius == 500.0
+    for margin, side in zip(
+        np.subtract(pair.grid.size, pair.overlap_px) / 2, pair.grid.pixel_sides_m, strict=True
+    ):
+        assert margin * side >= 500.0 - side
+    assert coarser_m(part, world) == coarser_m(world, part) == pytest.approx(10.0, rel=0.01)
 
 
 def test_a_radius_in_metres_is_kept_along_both_axes_of_degrees(files: Files) -> None:

@@ -285,20 +285,23 @@ def make_pair(
         raise SameFileError(f"reference and input are the same raster: {ref.path}")
     require_georeferenced_alike(ref, inp)
     wanted = matching_pixel_size_m or coarser_m(ref.grid, inp.grid)
-    finest = min(grid.pixel_size_m for grid in (ref.grid, inp.grid))
+    own = part_below(ref.grid, inp.grid)
+    finest = min(own.pixel_size_m, part_below(inp.grid, ref.grid).pixel_size_m)
     if wanted < finest * (1 - _SAME_SIZE):
         raise ParameterError(
             f"a pixel size for matching of {wanted:g} is finer than both images' ({finest:g})"
         )
-    factor = wanted / ref.grid.pixel_size_m
-    grid = ref.grid if abs(factor - 1) < _SAME_SIZE else ref.grid.scaled(factor)
-    radius = default_radius_m(grid) if search_radius_m is None else search_radius_m
+    factor = wanted / own.pixel_size_m
+    factor = 1.0 if abs(factor - 1) < _SAME_SIZE else factor
+    grid, sides_m = ref.grid.scaled(factor), own.scaled(factor).pixel_sides_m
+    usual_m = default_radius_m(factor * own.pixel_size_m, ref.grid.crs is not None)
+    radius = usual_m if search_radius_m is None else search_radius_m
     limits = SearchLimits(radius, rotation_deg, (1 / scale, scale))
     outline = inp.grid.to_pixels_of(ref.grid)(inp.grid.pixel_to_map(inp.grid.outline()))
     if not len(finite(outline)):
-        own, other = (crs_name(of.grid.crs) for of in (inp, ref) if of.grid.crs is not None)
+        names = [crs_name(of.grid.crs) for of in (inp, ref) if of.grid.crs is not None]
         raise NoOverlapError(
-            f"{inp.path} (in {own}) has no position in the CRS of {ref.path} ({other})"
+            f"{inp.path} (in {names[0]}) has no position in the CRS of {ref.path} ({names[1]})"
         )
     nominal = grid.map_to_pixel(ref.grid.pixel_to_map(outline))
     if not limits.is_shift and not ref.grid.is_georeferenced:
@@ -308,9 +311,9 @@ def make_pair(
     if overlap is None:
         raise NoOverlapError(f"{ref.path} and {inp.path} do not overlap")
     if not limits.is_shift:
-        outline = _rotated(outline, grid.pixel_sides_m, rotation_deg, scale)
+        outline = _rotated(outline, sides_m, rotation_deg, scale)
     # Measured in the shorter side of a pixel, so that the radius is covered along that axis, too.
-    side_m = min(grid.pixel_sides_m)
+    side_m = min(sides_m)
     limits = replace(limits, radius=min(radius, _farthest_px(grid, outline) * side_m))
     radius_px = limits.radius / side_m
     reach = _box(grid, outline, radius_px)
@@ -318,7 +321,7 @@ def make_pair(
     matching, overlap_px = grid.window(*reach), (overlap.width, overlap.height)
     around = _surroundings(reach, radius_px, None if limits.is_shift else nominal)
     reference, input = (
-        image if image.mask is None else image.masked(image.mask, grid)
+        image if image.mask is None else image.masked(image.mask, matching)
         for image in (reference, input)
     )
     return ImagePair(reference, input, matching, overlap_px, grid.window(*around), limits)
@@ -369,15 +372,29 @@ def _surroundings(reach: Window, radius_px: float, nominal_px: FloatArray | None
     return Window.between(low, high)
 
 
-def default_radius_m(grid: Grid) -> float:
-    """Return the search radius for a matching grid: 100 m or 20 pixels, whichever is larger."""
-    usual = 100.0 if grid.crs is not None else 0.0
-    return max(usual, 20 * grid.pixel_size_m)
+def default_radius_m(pixel_size_m: float, is_on_map: bool) -> float:
+    """Return the search radius for matching pixels: 20 of them; on a map 100 m at least."""
+    return max(100.0 if is_on_map else 0.0, 20 * pixel_size_m)
 
 
 def coarser_m(reference: Grid, input: Grid) -> float:
-    """Return the pixel size of the coarser of two grids, in metres."""
-    return max(reference.pixel_size_m, input.pixel_size_m if input.is_georeferenced else 0.0)
+    """Return the pixel size of the coarser of two grids where they overlap, in metres."""
+    own_m = part_below(reference, input).pixel_size_m
+    return (
+        max(own_m, part_below(input, reference).pixel_size_m) if input.is_georeferenced else own_m
+    )
+
+
+def part_below(grid: Grid, other: Grid) -> Grid:
+    """Return the part of a grid that another one nominally covers; all of it if none is known.
+
+    The scale of a map of the world is another one at the map's centre.
+    """
+    if grid.crs is None or other.crs is None:
+        return grid
+    outline = other.to_pixels_of(grid)(other.pixel_to_map(other.outline()))
+    box = _box(grid, outline, 0.0) if len(finite(outline)) else None
+    return grid if box is None else grid.window(*box)
 
 
 def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:

@@ -158,8 +158,8 @@ def usual_radius_m(reference: Grid, input: Grid, free: FreeSearch) -> float:
         Search limits without georeferencing.
     """
     share_m = None if input.is_georeferenced else _free_radius_m(input, free)
-    factor = coarser_m(reference, input) / reference.pixel_size_m
-    return default_radius_m(reference.scaled(factor)) if share_m is None else share_m
+    usual_m = default_radius_m(coarser_m(reference, input), reference.crs is not None)
+    return usual_m if share_m is None else share_m
 
 
 def _free_radius_m(grid: Grid, free: FreeSearch) -> float | None:

@@ -29,7 +29,7 @@ from ..matching.band_shifts import BandShift, band_shifts
 from ..matching.matcher import MaskOf
 from ..matching.shared_content import ImageKinds, Sensors
 from ..rasters.grid import Grid, PointFunction
-from ..rasters.pair import Image, ImagePair
+from ..rasters.pair import Image, ImagePair, part_below
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Mask, Window
@@ -101,7 +101,8 @@ class ImageFacts:
     @cached_property
     def band_shifts(self) -> Sequence[BandShift]:
         """Shifts of bands against the first band that shows the ground, in matching pixels."""
-        scale = self.image.source.grid.pixel_size_m / self.scene.grid.pixel_size_m
+        grid = self.scene.grid
+        scale = part_below(self.image.source.grid, grid).pixel_size_m / grid.pixel_size_m
         found = band_shifts(self.image.source)
         return [replace(one, apart_px=one.apart_px * scale) for one in found]
 
