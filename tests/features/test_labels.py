@@ -20,7 +20,7 @@ def test_numbers_are_the_same_however_they_are_written(
 ) -> None:
     """Of text, the letters count."""
     path = tmp_path / "l.geojson"
-    point = {"type": "Point", "coordinates": [9.0, 45.0]}
+    point = {"type": "Point", "coordinates": [9.0005, 45.1532]}
     feature = {"type": "Feature", "geometry": point, "properties": {"class": value}}
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
     found = layer_labels(path, "class", ["1234567", "1.0", "cloud"], utm_grid(10, 10))

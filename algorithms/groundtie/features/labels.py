@@ -179,7 +179,7 @@ def layer_labels(
             xy.extend(each.tolist())
             labels.extend([label] * len(each))
     if not areas and not xy:
-        raise VectorLayerError(f"{path} has neither points nor polygons with a class")
+        raise VectorLayerError(f"{path} has neither points nor polygons with a class at the image")
     return LayerLabels(tuple(areas), np.array(xy).reshape(-1, 2), np.array(labels, np.int8))
 
 

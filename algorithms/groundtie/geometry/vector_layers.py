@@ -17,10 +17,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rasterio.crs import CRS
 from rasterio.errors import CRSError
-from rasterio.warp import transform_geom
 
 from ..errors import GeoreferencingError, VectorLayerError, raised_by
 from ..packages import interpreter
@@ -52,18 +50,28 @@ class VectorLayer:
     fields: tuple[str, ...]
     features: tuple[dict[str, Any], ...]
 
+    @property
+    def kinds(self) -> set[str]:
+        """The types of its geometries, as in GeoJSON; of collections, those of their parts."""
+        return {
+            str(geometry["type"])
+            for feature in self.features
+            for geometry in simple_geometries(feature["geometry"])
+        }
+
     def on_map(self, grid: Grid) -> VectorLayer:
         """Return the features that have a geometry, on the map of a grid.
 
-        The parts of a geometry collection become separate features with its properties. Longitudes
-        are shifted by full turns to lie near the grid's.
+        The parts of a geometry collection become separate features with its properties. On another
+        map, or one with longitudes, this holds for all geometries of several parts, what lies far
+        from the grid is left out, and longitudes are shifted by full turns to lie near the grid's.
 
         Raises
         ------
         GeoreferencingError
             Only one of the layer and the map has a CRS.
         VectorLayerError
-            A geometry cannot be reprojected to the map.
+            A geometry is damaged, or the grid has no place on the layer's map.
         """
         crs = grid.crs
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
@@ -72,47 +80,20 @@ class VectorLayer:
             for feature in self.features
             for geometry in simple_geometries(feature["geometry"])
         ]
-        geometries = [geometry for _, geometry in located]
-        if self.crs is not None and self.crs != crs:
+        if self.crs is not None and (self.crs != crs or full_turn(crs) is not None):
+            from shapely.errors import GEOSException  # slow to load
+
+            from .map_shapes import MapShapes
+
+            around = MapShapes.around(grid, self.crs)
+            if around is None:
+                raise VectorLayerError(f"the image has no place on the map of {self.path}")
             try:
-                geometries = transform_geom(self.crs, crs, geometries)
-            except Exception as error:
-                if not isinstance(error, ValueError) and not raised_by(error, "rasterio"):
-                    raise
-                raise VectorLayerError(f"cannot reproject {self.path}: {error}") from error
-        longitude, turn = grid.pixel_to_map([grid.centre_px])[0, 0], full_turn(crs)
-        if turn is not None:
-            geometries = [_near_longitude(geometry, longitude, turn) for geometry in geometries]
-        features = (
-            {**feature, "geometry": geometry}
-            for (feature, _), geometry in zip(located, geometries, strict=True)
-        )
+                located = [(feature, part) for feature, one in located for part in around.of(one)]
+            except (ValueError, TypeError, GEOSException) as error:
+                raise VectorLayerError(f"a geometry of {self.path} is damaged: {error}") from error
+        features = ({**feature, "geometry": geometry} for feature, geometry in located)
         return replace(self, crs=crs, features=tuple(features))
-
-
-def _near_longitude(geometry: Any, longitude: float, turn: float) -> Any:
-    """Return a geometry shifted by full turns to within half a turn of a longitude."""
-    coordinates = geometry["coordinates"]
-    seen = _longitudes(coordinates)
-    turns = np.rint(((min(seen) + max(seen)) / 2 - longitude) / turn) if seen else 0
-    return {**geometry, "coordinates": _moved(coordinates, -turns * turn)} if turns else geometry
-
-
-def _is_position(coordinates: Any) -> bool:
-    return len(coordinates) > 0 and isinstance(coordinates[0], int | float)
-
-
-def _longitudes(coordinates: Any) -> list[float]:
-    """Return the longitudes of all positions, at any depth of GeoJSON's nesting."""
-    if _is_position(coordinates):
-        return [coordinates[0]]
-    return [x for part in coordinates for x in _longitudes(part)]
-
-
-def _moved(coordinates: Any, by: float) -> Any:
-    if _is_position(coordinates):
-        return [coordinates[0] + by, *coordinates[1:]]
-    return [_moved(part, by) for part in coordinates]
 
 
 def simple_geometries(geometry: Any) -> list[Any]:

@@ -110,12 +110,12 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
     GeoreferencingError
         Only one of layer and scene has a CRS.
     """
-    layer = read_vector_layer(path).on_map(scene.grid)
-    every = [feature["geometry"] for feature in layer.features]
+    layer = read_vector_layer(path)
+    if layer.kinds.isdisjoint(AREAS + _LINES):
+        raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")
+    every = [feature["geometry"] for feature in layer.on_map(scene.grid).features]
     areas, lines = (
         tuple(geometry for geometry in every if geometry["type"] in kinds)
         for kinds in (AREAS, _LINES)
     )
-    if not areas and not lines:
-        raise VectorLayerError(f"the vector layer {path} has neither polygons nor lines")
     return LayerMask(scene, areas, lines, int(width_m / scene.grid.pixel_size_m / 2))

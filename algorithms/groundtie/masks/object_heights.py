@@ -115,19 +115,20 @@ def read_footprints(path: str | os.PathLike[str], grid: Grid) -> FootprintModel:
     GeoreferencingError
         Only one of layer and grid has a CRS.
     """
-    layer = read_vector_layer(path).on_map(grid)
+    layer = read_vector_layer(path)
     field = next((name for name in layer.fields if name.lower() in _HEIGHT_FIELDS), None)
     if field is None:
         has = ", ".join(layer.fields) or "none"
         raise VectorLayerError(f"{path} has no field height with metres; its fields: {has}")
+    stated = [_metres(feature["properties"].get(field)) for feature in layer.features]
+    if layer.kinds.isdisjoint(AREAS) or all(height_m is None for height_m in stated):
+        raise VectorLayerError(f"{path} has no polygons with a height in {field}")
     found = [
         (feature["geometry"], _metres(feature["properties"].get(field)))
-        for feature in layer.features
+        for feature in layer.on_map(grid).features
         if feature["geometry"]["type"] in AREAS
     ]
     buildings = sorted(((area, m) for area, m in found if m is not None), key=lambda one: one[1])
-    if not buildings:
-        raise VectorLayerError(f"{path} has no polygons with a height in {field}")
     return FootprintModel(tuple(buildings), tuple(area for area, m in found if m is None))
 
 

@@ -1,0 +1,112 @@
+"""Shapes of a vector layer on the map of a grid.
+
+Straight edges of one map are curves on another one, so that long edges are divided before they are
+reprojected. What lies far from the grid is cut off first: it may be outside of the projection's
+domain, as a polygon of all oceans is on a UTM map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from rasterio.crs import CRS
+
+from ..rasters.grid import FloatArray, Grid, finite, full_turn, mesh, near_longitude, reproject
+
+# Positions along each side of the grid by which its place on the layer's map is known.
+_NODES = 21
+
+# Edges are divided into pieces of this share of the grid's side: a parallel at latitude φ departs
+# from its chord by L² tan φ / 8 R, which is 0.02 m of 1 km at 45°.
+_PIECE = 0.01
+
+
+@dataclass(frozen=True)
+class MapShapes:
+    """The neighbourhood of a grid on the map of a layer.
+
+    Parameters
+    ----------
+    grid
+        The pixels.
+    crs
+        CRS of the layer, another one than the grid's, or one with longitudes.
+    box
+        Left, lower, right and upper limit on the layer's map: the grid's extent, and as much on
+        each side of it.
+    piece
+        Largest length of an edge, in units of the layer's map.
+    """
+
+    grid: Grid
+    crs: CRS
+    box: tuple[float, float, float, float]
+    piece: float
+
+    @classmethod
+    def around(cls, grid: Grid, crs: CRS) -> MapShapes | None:
+        """Return the neighbourhood of a grid; None if no part of it has a place on the map."""
+        along = [np.linspace(-0.5, side - 0.5, _NODES) for side in grid.size]
+        seen = reproject(grid.pixel_to_map(mesh(*along)), grid.crs, crs)
+        known = finite(seen)
+        if not len(known):
+            return None
+        seen, known = (near_longitude(xy, known[len(known) // 2, 0], crs) for xy in (seen, known))
+        low, high = known.min(axis=0), known.max(axis=0)
+        (left, lower), (right, upper) = 2 * low - high, 2 * high - low
+        with np.errstate(invalid="ignore"):
+            steps = np.linalg.norm(np.diff(seen.reshape(_NODES, _NODES, 2), axis=1), axis=2)
+        piece = float(np.nanmedian(steps)) * (_NODES - 1) * _PIECE
+        return cls(grid, crs, (left, lower, right, upper), piece)
+
+    def of(self, geometry: Any) -> list[Any]:
+        """Return the parts of a geometry that lie near the grid, on the grid's map.
+
+        The geometry and its parts are as in GeoJSON, without collections.
+
+        Raises
+        ------
+        ValueError
+            The geometry is damaged.
+        """
+        shape = shapely.geometry.shape(geometry)
+        turn = full_turn(self.crs)
+        parts = [
+            part
+            for by in ((0.0,) if turn is None else (-turn, 0.0, turn))
+            for part in self._cut(_moved(shape, by))
+        ]
+        if self.crs != self.grid.crs:
+            parts = shapely.transform(shapely.segmentize(parts, self.piece), self._reprojected)
+        return [shapely.geometry.mapping(part) for part in parts]
+
+    def _cut(self, shape: Any) -> Sequence[Any]:
+        if shape.is_empty:
+            return []
+        left, lower, right, upper = shape.bounds
+        box = self.box
+        if box[0] <= left and box[1] <= lower and right <= box[2] and upper <= box[3]:
+            return list(shapely.get_parts([shape]))
+        parts: NDArray[Any] = shapely.get_parts([shapely.clip_by_rect(shape, *box)])
+        # What a box touches only is a line or a point.
+        return list(parts[shapely.get_dimensions(parts) == shapely.get_dimensions(shape)])
+
+    def _reprojected(self, xy: FloatArray) -> FloatArray:
+        moved = reproject(xy, self.crs, self.grid.crs)
+        turn, own = full_turn(self.grid.crs), full_turn(self.crs)
+        if turn is None:
+            return moved
+        # Reprojected longitudes lie within ±180°, those of a layer may not.
+        if own is not None:
+            return near_longitude(moved, xy[:, :1] / own * turn, self.grid.crs)
+        centre = self.grid.pixel_to_map([self.grid.centre_px])[0, 0]
+        return near_longitude(moved, centre, self.grid.crs)
+
+
+def _moved(shape: Any, by: float) -> Any:
+    return shapely.transform(shape, lambda xy: xy + [by, 0.0]) if by else shape
