@@ -40,7 +40,7 @@ from groundtie.registration.rules.survey import (
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
-from groundtie.similarity.in_common import MOVED_GROUND_SHARE
+from groundtie.similarity.in_common import LEAST_BRIGHTER, MOVED_GROUND_SHARE
 
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase
@@ -145,6 +145,15 @@ def _height_of_else(evidence: RegistrationEvidence) -> float:
     return height if math.isfinite(height) else math.nan
 
 
+def _brighter(evidence: RegistrationEvidence) -> float:
+    """Return by how much what varies alike is brighter, where hardly anything else matches."""
+    rest = evidence.surveys.rest
+    if rest is None or rest.survey is None or not math.isfinite(height_of_else(rest)):
+        return math.nan
+    is_low = rest.survey.height < LEAST_OF_REST
+    return rest.shared.sameness.brighter if is_low else math.nan
+
+
 def _opposite_signs(evidence: RegistrationEvidence) -> float:
     """Return how many windows have opposite contrast for each that has the same; NaN: not asked."""
     signs = evidence.surveys.signs
@@ -187,6 +196,7 @@ STATISTICS = (
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
+    Statistic("nothing else in common: brighter", LEAST_BRIGHTER, _brighter),
     Statistic(
         "rest elsewhere: second peak",
         REST_PEAK_DEVIATIONS,

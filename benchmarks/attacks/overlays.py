@@ -235,6 +235,17 @@ def cloud_deck(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
     return Overlay(215 + 25 * smooth_noise(shape, 4, rng), alpha, dark)
 
 
+@overlay("soft clouds")
+def soft_clouds(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
+    """Cover a part with clouds that become thin towards their edges, without shadows."""
+    side = float(rng.uniform(15, 45))
+    noise = smooth_noise(shape, side, rng)
+    noise += 0.35 * smooth_noise(shape, side / 4, rng) + 0.15 * smooth_noise(shape, side / 12, rng)
+    cover = np.quantile(noise, 1 - rng.uniform(0.2, 0.5))
+    alpha = np.clip((noise - cover) / rng.uniform(0.7, 1.6), 0, 1)
+    return Overlay(np.full(shape, 225.0), alpha)
+
+
 @overlay("soft pattern noise")
 def soft_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Overlay:
     """Add the same noise, correlated over some pixels as by interpolation."""

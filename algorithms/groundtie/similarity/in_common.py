@@ -78,6 +78,10 @@ _LEAST_LEFT = 0.1
 # both images with such a transform reach as much as ground.
 MOVED_GROUND_SHARE = 0.15
 
+# Clouds are brighter than the ground. Suite margins: over different ground, what varies alike is
+# 1.06 standard deviations and more brighter where it is clouds with soft edges.
+LEAST_BRIGHTER = 0.8
+
 # Least valid share of the pixels that a pixel of a reduced image averages.
 _LEAST_VALID = 0.25
 
@@ -110,6 +114,9 @@ class Sameness:
         to 1, 1 to 1.5, or 1.5 to 2 pixels away, relative to the edges within a half; or a quarter
         to a half away, relative to those within a quarter; the largest of these. A lower limit, as
         above.
+    brighter
+        By how many standard deviations pixels that vary alike are brighter than the others, mean of
+        both images.
     """
 
     sharpness: float
@@ -120,6 +127,7 @@ class Sameness:
     related: float = 0.0
     step_width: float = np.inf
     beside: float = 0.0
+    brighter: float = 0.0
 
     @property
     def is_evident(self) -> bool:
@@ -159,6 +167,11 @@ class Sameness:
     def has_seams(self) -> bool:
         """Whether steps between columns or rows coincide more sharply than those of ground."""
         return self.step_width <= DRAWN_WIDTH
+
+    @property
+    def may_be_clouds(self) -> bool:
+        """Whether what varies alike is brighter than the remaining area, as clouds are."""
+        return self.brighter >= LEAST_BRIGHTER
 
     @property
     def is_finer_than_ground(self) -> bool:
@@ -226,10 +239,13 @@ class Look:
         Number of pixels that are the same, related, and valid (see `Windows`): in the images, in
         reduced ones, in those reduced once more, and in reduced ones without the pixels that are
         the same in the images, shape (4, 3).
+    greys
+        See `Windows.greys`.
     """
 
     edges: NDArray[np.int_]
     windows: NDArray[np.int_]
+    greys: NDArray[np.float64]
 
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> Look:
@@ -244,7 +260,7 @@ class Look:
         coarse = [reduced_patch(patch, _FURTHER, _LEAST_VALID) for patch in smaller]
         pairs = smaller, coarse, left
         counts = np.array([whole.counts, *(Windows.of(*pair).counts for pair in pairs)])
-        return cls(_count_edges(reference, input), counts)
+        return cls(_count_edges(reference, input), counts, whole.greys)
 
 
 def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> Sameness:
@@ -273,11 +289,22 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
         ground=float(windows[3, 0] / max(every[3], _LEAST_LEFT * every[1], 1.0)),
         related=float(related),
         step_width=step_width(np.sum(steps, axis=0)),
+        brighter=_brighter(np.sum([one.greys for one in looks], axis=0)),
         beside=max(
             _more_of(to_half) / _most_of(sharp),
             *(_more_of(some) / _most_of(sharp + blurred) for some in beside),
         ),
     )
+
+
+def _brighter(greys: NDArray[np.float64]) -> float:
+    """Return `Sameness.brighter` by the sums of all windows' greys."""
+    if not greys[..., 0].all():
+        return 0.0
+    means, every = greys[..., 1] / greys[..., 0], greys.sum(axis=1)
+    variance = every[:, 2] / every[:, 0] - (every[:, 1] / every[:, 0]) ** 2
+    spread = np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+    return float(((means[:, 0] - means[:, 1]) / spread).mean())
 
 
 def _most_of(some: NDArray[np.int_]) -> float:

@@ -57,12 +57,15 @@ class Windows:
     one, other, common
         Variances of both, and their covariance. The grey values of `other` are scaled so that the
         median ratio of the two variances is 1.
+    means
+        Mean grey values of both, as they are.
     """
 
     valid: Mask
     one: FloatImage
     other: FloatImage
     common: FloatImage
+    means: tuple[FloatArray, FloatArray]
 
     @classmethod
     def of(cls, one: Patch, other: Patch) -> Windows:
@@ -77,7 +80,8 @@ class Windows:
         common = np.where(varies, _mean(first * second) / share - mean * other_mean, 0)
         gain = np.sqrt(median(variance[varies] / other_variance[varies])) if varies.any() else 1.0
         found = variance, gain**2 * other_variance, gain * common
-        return cls(valid, *(np.asarray(image, np.float32) for image in found))
+        of_one, of_other, of_both = (np.asarray(image, np.float32) for image in found)
+        return cls(valid, of_one, of_other, of_both, (mean, other_mean))
 
     @property
     def same(self) -> Mask:
@@ -93,6 +97,15 @@ class Windows:
         """
         alike = self.common**2 >= (1 - _DIFFERING_SHARE) * self.one * self.other
         return self.valid & alike & ((self.one > 0) == (self.other > 0))
+
+    @property
+    def greys(self) -> FloatArray:
+        """Number, sum and sum of squares of both images' means, shape (2, 2, 3).
+
+        Of pixels that are the same, and of the other valid ones.
+        """
+        parts = self.same, self.valid & ~self.same
+        return np.array([[_moments(of[part]) for part in parts] for of in self.means])
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -214,6 +227,10 @@ def _variance(values: FloatArray, mean: FloatArray, share: FloatArray) -> FloatA
     squares = _mean(values**2) / share
     variance = squares - mean**2
     return np.where(variance > _ROUNDING * squares.max(initial=0.0), variance, 0.0)
+
+
+def _moments(values: FloatArray) -> tuple[float, float, float]:
+    return float(values.size), float(values.sum()), float(np.square(values).sum())
 
 
 def _mean(of: FloatArray) -> FloatArray:

@@ -204,12 +204,15 @@ def _rest_elsewhere(evidence: RegistrationEvidence) -> str | None:
 def height_of_else(rest: Rest | None) -> float:
     """Return the mean similarity of chips without the content that both images share.
 
-    Of the surveys without shared windows and without shared edges, the higher; infinite if neither
-    was made or both images are a radar's.
+    Of the surveys without shared windows and without shared edges, the higher; of what may be
+    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made or both
+    images are a radar's.
     """
     if rest is None or rest.shared.is_evident or rest.shared.sensors is Sensors.RADARS:
         return math.inf
-    heights = [left.height for left in (rest.survey, rest.without_edges) if left is not None]
+    is_soft = rest.shared.sameness.may_be_clouds
+    ways = (rest.survey,) if is_soft else (rest.survey, rest.without_edges)
+    heights = [left.height for left in ways if left is not None]
     return max(heights, default=math.inf)
 
 
