@@ -87,6 +87,10 @@ class PointErrors(Rows):
         """Return the errors at no points."""
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0, bool))
 
+    def matched_in(self, pixel_px: float) -> PointErrors:
+        """Return the errors with windows and tolerance of matching pixels of another size."""
+        return replace(self, window_px=WINDOW_PX * pixel_px, tolerance_px=TOLERANCE_PX * pixel_px)
+
     @property
     def placed(self) -> Mask:
         """Which points the transform can place at all, shape (n,)."""
