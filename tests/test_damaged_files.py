@@ -329,6 +329,18 @@ class TestNames:
         line = refused(capsys, ["warp", name, "out.tif", "--transform", "affine.json"])
         assert "has a name that is not UTF-8: 'caf\\udce9.tif'" in line
 
+    def test_a_working_folder_that_is_no_utf8(
+        self, files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        folder = files / os.fsdecode(b"M\xfcnchen")
+        folder.mkdir()
+        shutil.copy("image.tif", folder)
+        (folder / "t.csv").write_text("input,output\nimage.tif,m.tif\n")
+        monkeypatch.chdir(folder)
+        for call in ("mask-threshold image.tif m.tif", "batch mask-threshold t.csv"):
+            assert "has a name that is not UTF-8" in refused(capsys, call)
+        assert sorted(os.listdir()) == ["image.tif", "t.csv"]
+
 
 def test_files_that_broke_a_version(real_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = real_data / "bad-files"

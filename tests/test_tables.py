@@ -44,7 +44,29 @@ def test_yaml_reads_as_json(tmp_path: Path) -> None:
     pytest.importorskip("yaml")
     path = tmp_path / "t.yaml"
     path.write_text("defaults: {seed: 4}\nrows:\n  - input: a.tif\n  - {input: b.tif, seed: 9}\n")
-    assert read_rows(path) == [{"input": "a.tif", "seed": 4}, {"input": "b.tif", "seed": 9}]
+    assert read_rows(path) == [{"input": "a.tif", "seed": "4"}, {"input": "b.tif", "seed": "9"}]
+    path.write_text("- &a {input: a.tif, seed: 4, model: null}\n- {<<: *a, input: b.tif, seed: ~}")
+    assert read_rows(path) == [{"input": "a.tif", "seed": "4"}, {"input": "b.tif"}]
+
+
+@pytest.mark.parametrize(
+    "name", ["NO", "on", "0123", "0x1f", "12:30:45", "2020-01-15", "1_000", "1.10", "1e3", ".inf"]
+)
+def test_yaml_keeps_a_text_as_it_is_written(tmp_path: Path, name: str) -> None:
+    """YAML 1.1 has other values for them: NO is false, 12:30:45 a number to the base of 60."""
+    pytest.importorskip("yaml")
+    (tmp_path / "t.yaml").write_text(f"- name: {name}\n  inputs: [{name}, b.tif]\n")
+    assert read_rows(tmp_path / "t.yaml") == [{"name": name, "inputs": [name, "b.tif"]}]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_rows_of_a_spreadsheet_without_a_value_count_for_nothing(
+    tmp_path: Path, delimiter: str
+) -> None:
+    path = tmp_path / "t.csv"
+    lines = ["", " , ", "input,search-radius", "a.tif,3", ",", " , ", "b.tif,", ",,", ""]
+    path.write_text("\r\n".join(lines).replace(",", delimiter), newline="")
+    assert read_rows(path) == ROWS
 
 
 def test_yaml_without_its_package_is_one_line(
@@ -61,6 +83,8 @@ def test_yaml_without_its_package_is_one_line(
     [
         ("t.csv", "", "has no rows"),
         ("t.csv", "input,output\n", "has no rows"),
+        ("t.csv", "input,output\n,\n", "has no rows"),
+        ("t.csv", ";\n\n", "has no rows"),
         ("t.csv", "input\na.tif,b.tif\n", "row 1 has more fields"),
         ("t.csv", "input,input\na,b\n", "stands twice"),
         ("t.csv", "max-error,max_error\n1,2\n", "stands twice"),

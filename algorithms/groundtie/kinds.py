@@ -335,7 +335,11 @@ def _named(name: str, value: Any) -> Path | str:
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
         raise ParameterError(f"{name} must be a path, not {_shown(value)}")
     require_possible(name, os.fspath(value))
-    return raster_name(value)
+    found = raster_name(value)
+    if isinstance(found, Path):
+        # Libraries and results take whole paths: the working folder is a part of the name.
+        require_possible(name, os.path.abspath(found))
+    return found
 
 
 def _readable(name: str, found: Path | str) -> Path | str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,18 @@ SUFFIXES = (".csv", ".json", ".yaml", ".yml")
 
 _DELIMITERS = ",;\t"
 
+# What a line without a value is made of.
+_BLANK = f"{_DELIMITERS} \r\n"
+
+# Values of YAML that are no text, but none at all, and names that stand for the values of others.
+_YAML_TAGS = ("tag:yaml.org,2002:null", "tag:yaml.org,2002:merge")
+
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
     """Return the rows of a table, by the names of their columns; empty cells are left out.
 
     CSV has the names in its first line. JSON and YAML hold a list of rows, or `rows` beside
-    `defaults`, which apply where a row has no value of its own.
+    `defaults`, which apply where a row has no value of its own. Values of CSV and YAML are texts.
 
     Raises
     ------
@@ -56,10 +63,12 @@ def csv_rows(
 ) -> tuple[list[str], list[dict[str, Any]]]:
     """Return the names of a CSV table's columns, and its rows by these names.
 
+    Rows without a value are left out: spreadsheets write empty cells below a table.
+
     Parameters
     ----------
     lines
-        The table; its first line has the names.
+        The table; its first line that is not blank has the names.
     column
         Returns the name of a column by that in the first line.
 
@@ -68,7 +77,7 @@ def csv_rows(
     ValueError
         A name occurs twice, or a row has more fields, that are not empty, than the first line.
     """
-    held = list(lines)
+    held = list(dropwhile(lambda line: not line.strip(_BLANK), lines))
     # Spreadsheets write semicolons if a comma is the decimal sign.
     delimiter = max(_DELIMITERS, key=held[0].count) if held else ","
     reader = csv.DictReader(held, delimiter=delimiter)
@@ -80,7 +89,7 @@ def csv_rows(
             raise ValueError(
                 f"row {number} has more fields than the first line (is a comma the decimal sign?)"
             )
-    return names, rows
+    return names, [row for row in rows if any((field or "").strip() for field in row.values())]
 
 
 def _read_csv(path: Path) -> list[dict[str, Any]]:
@@ -109,9 +118,21 @@ def _read_yaml(path: Path) -> Any:
     except ImportError as error:
         raise ValueError("YAML needs the Python package PyYAML; JSON and CSV do not") from error
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+        return yaml.load(path.read_text(encoding="utf-8-sig"), _loader_of_texts(yaml))
     except (yaml.YAMLError, RecursionError) as error:
         raise ValueError(one_line(error)) from error
+
+
+def _loader_of_texts(yaml: Any) -> Any:
+    """Return a loader of YAML whose values are texts, as those of CSV.
+
+    PyYAML makes a truth value of the name NO, and other numbers of 0123, 12:30:45 and 1_000.
+    """
+    resolvers = {
+        first: [(tag, pattern) for tag, pattern in known if tag in _YAML_TAGS]
+        for first, known in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+    return type("TextLoader", (yaml.SafeLoader,), {"yaml_implicit_resolvers": resolvers})
 
 
 def _filled(row: dict[Any, Any]) -> dict[str, Any]:

@@ -295,6 +295,13 @@ class TestPage:
         page = written(report_of(assessment=Assessment(test_points=errors([0, 0]))), tmp_path)
         assert "Outliers among them do not count." in page.text
 
+    def test_points_of_an_image_that_is_finer_agree_in_its_pixels(self, tmp_path: Path) -> None:
+        """Two matching pixels are 40 of the input, also without control points."""
+        parts = {"test_points": errors([9, 0], 9), "check_points": errors([50, 0])}
+        assessment = Assessment(**{name: part.matched_in(20.0) for name, part in parts.items()})
+        report = report_of(assessment=assessment, verdict=None)
+        assert "test or check point within 40 px" in written(report, tmp_path).text
+
     def test_a_refusal(self, tmp_path: Path) -> None:
         assessment = Assessment(check_points=errors([4.0, 0]))
         report = report_of(assessment=assessment, verdict=assessment.judge(3.0))

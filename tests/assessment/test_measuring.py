@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from affine import Affine
 from known_errors import DEGREES, GRID, PLAIN, shifted
-from raster_files import UTM, write_raster
+from raster_files import UTM, utm_grid, write_raster
 from rasterio.crs import CRS
 
 from groundtie.arrays import Raster
-from groundtie.assessment.measuring import matching_px, measure_check_points, measure_tie_points
+from groundtie.assessment.measuring import (
+    AssessmentFiles,
+    matching_px,
+    measure_check_points,
+    measure_tie_points,
+)
 from groundtie.errors import GeoreferencingError, TooFewPointsError, TransformFileError
 from groundtie.geometry.tie_point_files import write_tie_points
 from groundtie.geometry.tie_points import TiePoints
@@ -57,6 +62,25 @@ def test_nothing_is_known_of_pixels_that_lie_outside_of_the_transforms_map() -> 
 
 class TestFiles:
     transform = shifted(37.0, -24.0)
+
+    @pytest.mark.parametrize("finer", [1, 20])
+    def test_points_agree_within_pixels_of_the_coarser_image(
+        self, tmp_path: Path, finer: int
+    ) -> None:
+        """Errors of 1.9 and of 2.1 pixels of 10 m, in an input of finer pixels."""
+        transform = shifted(0.0, 0.0, utm_grid(400 * finer, 300 * finer, 10 / finer))
+        error = finer * np.where((np.arange(60) < 30)[:, None], [1.9, 0.0], [0.0, 2.1])
+        for name in ("ties.gpkg", "checks.gpkg"):
+            write_tie_points(tmp_path / name, tie_points(transform, error), transform)
+        given = AssessmentFiles(
+            *(None, tmp_path / "ties.gpkg", tmp_path / "checks.gpkg", None, None, None, None)
+        )
+        path = write_raster(tmp_path / "r.tif", np.ones((300, 400), np.uint8), GRID)
+        with open_raster(path) as reference:
+            found = given.measure(transform, 20.0 * finer, reference)
+        for part in (found.test_points, found.check_points):
+            assert part.used.all()
+            assert part.agreeing.tolist() == [True] * 10 + [False] * 10
 
     def written(self, path: Path, text: str) -> Path:
         path.write_text(text, encoding="utf-8")

@@ -60,6 +60,17 @@ class TestPointErrors:
         expected = across_m * math.radians(1e-4) * math.cos(latitude)
         np.testing.assert_allclose(found.in_metres.bias, [expected, 0], rtol=1e-5, atol=1e-6)
 
+    def test_metres_in_degrees_are_those_of_each_points_latitude(self) -> None:
+        latitudes = np.array([32.0, 34.0, 66.0, 68.0])
+        grid = Grid(Affine(0.005, 0, 10, 0, -0.005, 70), LONLAT, 2000, 8000)
+        transform, xy = shifted(0.0, 0.0, grid, LONLAT), np.column_stack([[12.0] * 4, latitudes])
+        found = PointErrors.of(transform, xy, transform(xy) + [1.0, 0.0])
+        # On the ellipsoid of WGS 84.
+        phi = np.deg2rad(latitudes)
+        across_m = 6_378_137 / np.sqrt(1 - 0.00669438 * np.sin(phi) ** 2) * np.cos(phi)
+        expected = np.column_stack([np.deg2rad(0.005) * across_m, np.zeros(4)])
+        np.testing.assert_allclose(found.error_m, expected, rtol=1e-5, atol=1e-6)
+
     @pytest.mark.parametrize("turn", [0.0, 360.0, -360.0])
     def test_metres_across_the_antimeridian(self, turn: float) -> None:
         """Points of a table may count longitudes the other way round."""

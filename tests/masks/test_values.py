@@ -19,6 +19,10 @@ def test_numbers_and_ranges() -> None:
     assert excluded(" 0 , 5 - 5 ", [0, 1, 5]) == [0, 5]
 
 
+def test_whole_numbers_are_told_apart_as_far_as_single_precision_does() -> None:
+    assert excluded("16777215", [16_777_214, 16_777_215, 16_777_216]) == [16_777_215]
+
+
 def test_what_is_no_number_takes_no_part() -> None:
     values = np.array([np.nan, np.inf, 1.0])
     np.testing.assert_array_equal(mask_values("3").excluded(values), [True, True, False])
@@ -55,7 +59,11 @@ def test_names_may_be_written_either_way() -> None:
     assert mask_values("QA_PIXEL") is SCHEMES["qa-pixel"]
 
 
-@pytest.mark.parametrize("text", ["", "clouds", "3;4", "-3", "10-8", "1.5", "3,", "9" * 10])
+@pytest.mark.parametrize(
+    "text", ["", "clouds", "3;4", "-3", "10-8", "1.5", "3,", "9" * 10, "16777216", "1-16777217"]
+)
 def test_other_words_are_an_error(text: str) -> None:
-    with pytest.raises(ParameterError, match="must be numbers and ranges, as 3,8-10, or one of"):
+    with pytest.raises(
+        ParameterError, match="must be numbers up to 16777215 and ranges, as 3,8-10, or one of"
+    ):
         mask_values(text)

@@ -127,8 +127,8 @@ def test_a_mask_beside_the_image_is_taken_unless_it_is_not_wanted(tmp_path: Path
         (None, "scl", "there is no mask that the values scl belong to"),
         ("clouds.gpkg", "3", "the only value of a vector layer is inside"),
         ("a.json", "3", "a classifier has no values"),
-        ("a.tif", "inside", "must be numbers and ranges"),
-        ("a.tif", "none", "must be numbers and ranges"),
+        ("a.tif", "inside", "must be numbers up to"),
+        ("a.tif", "none", "must be numbers up to"),
     ],
 )
 def test_values_belong_to_their_kind_of_mask(mask: str | None, values: str, message: str) -> None:

@@ -18,7 +18,7 @@ from rasterio.windows import Window
 from textured_pairs import texture
 
 from groundtie.arrays import Raster
-from groundtie.errors import NotRegisteredError, ParameterError
+from groundtie.errors import NotRegisteredError, ParameterError, SameFileError
 from groundtie.rasters.grid import Grid
 from groundtie.series import registering
 from groundtie.series.pairs import PairResult, PairTask, pair_key
@@ -71,6 +71,23 @@ def test_a_further_date_does_not_change_the_frame(tmp_path: Path) -> None:
     dates_at(dates, UTM, 500_100, "d", "e", "f")
     found = coregister_series(out, [dates])
     assert frame_of(out) == before and found.reused_pairs > 0
+
+
+@pytest.mark.parametrize("is_linked", [False, True])
+def test_no_series_is_written_beside_its_dates_or_links_to_them(
+    tmp_path: Path, is_linked: bool
+) -> None:
+    """Of a folder of links, too: the next run would take what was written for dates."""
+    dates = dates_at(tmp_path / "dates", UTM, 500_000, "a", "b")
+    if is_linked:
+        links = tmp_path / "links"
+        links.mkdir()
+        for path in dates.iterdir():
+            (links / path.name).symlink_to(path)
+        dates = links
+    with pytest.raises(SameFileError, match="the output folder holds an input"):
+        coregister_series(dates, [dates])
+    assert sorted(path.name for path in dates.iterdir()) == ["a.tif", "b.tif"]
 
 
 @pytest.mark.parametrize(("grid", "share"), [("reference", None), ("input", 0.5)])

@@ -11,7 +11,7 @@ from raster_files import utm_grid
 from rasterio.crs import CRS
 from series_dates import FRAME, GRID
 
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, compose, reproject
 from groundtie.series.frame import SeriesFrame, rms_px, sigma_px
 
 DISPLACEMENT = np.array([3.0, -2.0, 0.4, 0.1, -0.2, 0.6])
@@ -43,6 +43,29 @@ def test_the_root_mean_square_is_that_of_a_lattice() -> None:
     moved = DISPLACEMENT[:2] + uv @ DISPLACEMENT[2:].reshape(2, 2)
     assert rms_px(DISPLACEMENT) == pytest.approx(np.sqrt((moved**2).sum(axis=1).mean()), rel=0.01)
     assert sigma_px(np.outer(DISPLACEMENT, DISPLACEMENT)) == pytest.approx(rms_px(DISPLACEMENT))
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+@pytest.mark.parametrize("latitude", [0.0, 69.5])
+def test_metres_are_those_at_the_centre_of_the_dates(latitude: float, turn_deg: float) -> None:
+    """By an azimuthal map around it; the hub reaches 18 degrees farther to the south."""
+    turned = Affine.translation(5, latitude + 0.5), Affine.rotation(turn_deg)
+    hub = Grid(compose(*turned, Affine.scale(1e-4, -1e-4)), CRS.from_epsg(4326), 100_000, 180_000)
+    date = hub.window(40_000, 3000, 5000, 5000)
+    frame = SeriesFrame.around(hub, [hub, *[date] * 6])
+    centre = frame.square.leave(np.zeros((1, 2)))
+    lon, lat = centre[0]
+    local = CRS.from_proj4(f"+proj=aeqd +lat_0={lat} +lon_0={lon} +datum=WGS84")
+    across = frame.centre_px + np.array([[0, 0], [1, 0], [0, 1]])
+    middle, right, below = reproject(frame.grid.pixel_to_map(across), hub.crs, local)
+    unit = reproject(centre + np.diag([1e-4, 1e-4]), hub.crs, local) / 1e-4
+    np.testing.assert_allclose(frame.metres_per_unit, np.diag(unit), rtol=1e-5)
+    displacement = np.random.default_rng(0).normal(0, 0.1, (1000, 6))
+    displacement[:, 1] += displacement[:, 0]
+    parts = displacement.reshape(-1, 3, 2) @ np.array([right - middle, below - middle])
+    expected = np.sqrt(((parts**2).sum(axis=2) @ [1, 1 / 3, 1 / 3]).mean())
+    covariance = displacement.T @ displacement / len(displacement)
+    assert frame.sigma_m(covariance) == pytest.approx(expected, rel=1e-5)
 
 
 def test_pixels_are_no_finer_than_the_dates() -> None:

@@ -88,6 +88,15 @@ def test_only_with_georeferencing_are_there_metres() -> None:
         assert [row["shift_x_m"], row["shift_y_m"]] == shift_m
 
 
+def test_metres_are_those_where_the_dates_lie() -> None:
+    """At 60° north, where a degree of longitude is half as long, on a hub down to the equator."""
+    hub = Grid(Affine(1e-3, 0, 5.0, 0, -1e-3, 60.05), CRS.from_epsg(4326), 1000, 60_000)
+    frame = SeriesFrame.around(hub, [hub, *[hub.window(0, 0, 100, 100)] * 3])
+    row = replace(series(list(DAYS)), frame=frame).rows()[1]
+    # On the ellipsoid, lengths of degrees at 60° are 55 800 m and 111 412 m.
+    assert [row["shift_x_m"], row["shift_y_m"]] == pytest.approx([111.6, 111.412], rel=1e-4)
+
+
 def test_thumbnails_show_the_ground_on_a_map_of_another_crs(tmp_path: Path) -> None:
     """Without a reference the rasters' grid is that of the hub, the frame's that of another."""
     zone_33 = CRS.from_epsg(32633)

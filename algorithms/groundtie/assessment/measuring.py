@@ -23,7 +23,7 @@ from ..rasters.reading import RasterSource
 from ..registration.stored_transform import load_stored, transform_of
 from .accuracy import Assessment
 from .consistency import Leg, consistency
-from .point_errors import WINDOW_PX, PointErrors
+from .point_errors import PointErrors
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,13 @@ class AssessmentFiles:
     ) -> Assessment:
         """Measure a transform by all evidence."""
         parts: dict[str, PointErrors] = {}
+        pixel_px = matching_px(found, reference)
         if self.tie_points is not None:
-            window_px = WINDOW_PX * matching_px(found, reference)
-            measured = measure_tie_points(self.tie_points, found, max_error_px, window_px)
+            measured = measure_tie_points(self.tie_points, found, max_error_px, pixel_px)
             parts["control_points"], parts["test_points"] = measured
         if self.check_points is not None:
-            parts["check_points"] = measure_check_points(self.check_points, found, self.tie_points)
+            check = measure_check_points(self.check_points, found, self.tie_points)
+            parts["check_points"] = check.matched_in(pixel_px)
         subject = Leg(str(self.transform or self.tie_points), found)
         if self.back_transform is not None:
             parts["two_way"] = consistency(subject, [_leg(self.back_transform)])
@@ -129,16 +130,18 @@ def measure_tie_points(
     path: Path,
     transform: Transform,
     max_error_px: float | None = None,
-    window_px: float = WINDOW_PX,
+    pixel_px: float = 1.0,
 ) -> tuple[PointErrors, PointErrors]:
     """Measure a transform at its control points and at its test points, in a file of tie points.
 
-    Control points have the role "fit", test points the role "check". `window_px` is the side of the
-    windows in which test points were searched for, in input pixels. Raises as `read_points`.
+    Control points have the role "fit", test points the role "check". `pixel_px` is the size of a
+    matching pixel in input pixels. Raises as `read_points`.
     """
     points = read_points(path, transform)
-    test = replace(_errors(transform, points, points.check), window_px=window_px)
-    control = _errors(transform, points, points.fit)
+    control, test = (
+        _errors(transform, points, which).matched_in(pixel_px)
+        for which in (points.fit, points.check)
+    )
     return control, test.of_inliers(max_error_px)
 
 

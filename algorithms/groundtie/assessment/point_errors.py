@@ -15,7 +15,7 @@ from ..geometry.rows import Rows
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..matching.check import CHECK_RADIUS_PX
-from ..rasters.grid import FloatArray, Grid, finite, metres_per_unit_at, near_longitude
+from ..rasters.grid import FloatArray, Grid, metres_per_unit_at, near_longitude
 from ..rasters.reading import Mask
 from .statistics import Statistics
 
@@ -72,7 +72,7 @@ class PointErrors(Rows):
         error_m = None
         if transform.crs is not None or transform.input_grid.is_georeferenced:
             moved = near_longitude(transform.inverse(px) - xy, 0.0, transform.crs)
-            error_m = moved * _metres_per_unit(transform, xy)
+            error_m = moved * metres_per_unit_at(xy, transform.crs)
         every = np.ones(len(px), bool)
         return cls(px, px - transform(xy), every, every, error_m)
 
@@ -86,6 +86,10 @@ class PointErrors(Rows):
     def none(cls) -> PointErrors:
         """Return the errors at no points."""
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, bool), np.zeros(0, bool))
+
+    def matched_in(self, pixel_px: float) -> PointErrors:
+        """Return the errors with windows and tolerance of matching pixels of another size."""
+        return replace(self, window_px=WINDOW_PX * pixel_px, tolerance_px=TOLERANCE_PX * pixel_px)
 
     @property
     def placed(self) -> Mask:
@@ -173,10 +177,3 @@ class PointErrors(Rows):
             **self.in_pixels.summary("px", ("col", "row")),
             **self.in_metres.summary("m", ("x", "y")),
         }
-
-
-def _metres_per_unit(transform: Transform, xy: FloatArray) -> FloatArray:
-    """Return the metres per unit of the reference map at the centre of some positions, (2,)."""
-    placed = finite(xy)
-    centre = placed.mean(axis=0) if len(placed) else np.zeros(2)
-    return np.array(metres_per_unit_at(centre, transform.crs))

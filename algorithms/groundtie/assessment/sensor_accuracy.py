@@ -48,8 +48,7 @@ class SensorErrors:
         error_px = points.input_px - rpc.project(points.lon_lat, points.height_m)
         placed = np.isfinite(np.hstack([moved, error_px])).all(axis=1)
         points.require_placed(np.asarray(placed))
-        per_unit = metres_per_unit_at(points.reference_xy.mean(axis=0), points.crs)
-        return cls(error_px, moved * per_unit)
+        return cls(error_px, moved * metres_per_unit_at(points.reference_xy, points.crs))
 
     def summary(self) -> dict[str, Any]:
         """Return the statistics as JSON values."""

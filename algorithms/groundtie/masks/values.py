@@ -20,6 +20,9 @@ from .scene import Scene, Selection
 # Stands for the values of a vector layer that covers the area which takes no part.
 INSIDE = "inside"
 
+# Pixels are read in single precision, which tells whole numbers apart up to here.
+_LARGEST = 2**24 - 1
+
 _RANGE = re.compile(r"\s*(\d{1,9})\s*(?:-\s*(\d{1,9})\s*)?")
 
 
@@ -80,11 +83,11 @@ def mask_values(text: str) -> MaskValues:
     for part in text.split(","):
         match = _RANGE.fullmatch(part)
         first, last = (0, -1) if match is None else (int(match[1]), int(match[2] or match[1]))
-        if last < first:
+        if not first <= last <= _LARGEST:
             names = ", ".join(SCHEMES)
             raise ParameterError(
-                f"values of a mask must be numbers and ranges, as 3,8-10, or one of {names}; of a "
-                f"vector layer {INSIDE}; not {text!r}"
+                f"values of a mask must be numbers up to {_LARGEST} and ranges, as 3,8-10, or one "
+                f"of {names}; of a vector layer {INSIDE}; not {text!r}"
             )
         ranges.append((first, last))
     return MaskValues(tuple(ranges))

@@ -150,18 +150,8 @@ class Grid:
 
         On a map that is sheared there, y is measured at right angles to x, so that areas are right.
         """
-        if self.crs is None:
-            return 1.0, 1.0
-        centre = self.pixel_to_map([self.centre_px])[0]
-        if self.crs.is_geographic:
-            degrees = _degrees_per_unit(self.crs)
-            east, north = _metres_per_degree(centre[1] * degrees)
-            return east * degrees, north * degrees
-        unit_m = float(self.crs.linear_units_factor[1])
-        scale = _scale_on_the_ground(centre, unit_m, self.crs)
-        if 'PROJECTION["Mercator' not in self.crs.to_wkt() and _is_for_surveys(scale):
-            return unit_m, unit_m
-        return scale[0] * unit_m, scale[1] * unit_m
+        x, y = metres_per_unit_at(self.pixel_to_map([self.centre_px]), self.crs)[0]
+        return float(x), float(y)
 
     @cached_property
     def east_north(self) -> FloatArray:
@@ -174,7 +164,7 @@ class Grid:
         if self.crs is None or self.crs.is_geographic:
             return along_axes
         centre = reproject(self.pixel_to_map([self.centre_px]), self.crs, LON_LAT)
-        half = np.diag(_STEP_M / 2 / np.array(_metres_per_degree(centre[0, 1])))
+        half = np.diag(_STEP_M / 2 / _metres_per_degree(centre[0, 1]))
         ends = reproject(np.concatenate([centre + half, centre - half]), LON_LAT, self.crs)
         if not np.isfinite(ends).all():
             return along_axes
@@ -341,16 +331,18 @@ def near_longitude(xy: FloatArray, longitude: FloatArray | float, crs: CRS | Non
     return np.asarray(xy - turns * [turn, 0]) if turns.any() else xy
 
 
-def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:
-    """Return the lengths of a degree of longitude and of a degree of latitude, on the ellipsoid."""
+def _metres_per_degree(latitude_deg: ArrayLike) -> FloatArray:
+    """Return the lengths of a degree of longitude and of a degree of latitude, on the ellipsoid.
+
+    The shape is that of the latitudes, and 2.
+    """
     # Positions outside of a projection's domain are infinite.
     with np.errstate(invalid="ignore"):
-        sine, cosine = (float(f(np.deg2rad(latitude_deg))) for f in (np.sin, np.cos))
+        sine, cosine = (f(np.deg2rad(latitude_deg)) for f in (np.sin, np.cos))
     # Radii of curvature of the prime vertical and of the meridian.
-    across = _RADIUS_M / math.sqrt(1 - _ECCENTRICITY2 * sine**2)
+    across = _RADIUS_M / np.sqrt(1 - _ECCENTRICITY2 * sine**2)
     along = across * (1 - _ECCENTRICITY2) / (1 - _ECCENTRICITY2 * sine**2)
-    degree = math.radians(1)
-    return degree * across * max(cosine, _LEAST_SHRINK), degree * along
+    return math.radians(1) * np.stack([across * np.maximum(cosine, _LEAST_SHRINK), along], axis=-1)
 
 
 def _degrees_per_unit(crs: CRS) -> float:
@@ -359,24 +351,21 @@ def _degrees_per_unit(crs: CRS) -> float:
     return round(float(np.rad2deg(crs.units_factor[1])), 12)
 
 
-def _is_for_surveys(scale: tuple[float, float]) -> bool:
-    return max(abs(scale[0] - 1), abs(scale[1] - 1)) <= _SURVEY_SCALE
+def _scale_on_the_ground(xy: FloatArray, unit_m: float, crs: CRS) -> FloatArray:
+    """Return the ratios of ground length to nominal length of a projected map's units, (n, 2).
 
-
-def _scale_on_the_ground(centre: FloatArray, unit_m: float, crs: CRS) -> tuple[float, float]:
-    """Return the ratio of ground length to nominal length of a projected map's units.
-
-    The ratios hold at a position, along x and at right angles to x; 1 outside of the projection's
+    The ratios hold at positions, along x and at right angles to x; 1 outside of the projection's
     domain.
     """
     along = np.array([[-0.5, 0], [0, -0.5], [0.5, 0], [0, 0.5]]) * (_STEP_M / unit_m)
-    before, after = np.split(_earth_centred(reproject(centre + along, crs, LON_LAT)), 2)
-    if not np.isfinite([before, after]).all():
-        return 1.0, 1.0
-    x, y = (after - before) / _STEP_M
-    width = max(float(np.linalg.norm(x)), _LEAST_SHRINK)
-    height = float(np.linalg.norm(np.cross(x, y))) / width
-    return width, max(height, _LEAST_SHRINK)
+    around = (xy[:, None] + along).reshape(-1, 2)
+    places = _earth_centred(reproject(around, crs, LON_LAT)).reshape(-1, 2, 2, 3)
+    with np.errstate(invalid="ignore"):
+        x, y = np.moveaxis((places[:, 1] - places[:, 0]) / _STEP_M, 1, 0)
+        width = np.maximum(np.linalg.norm(x, axis=1), _LEAST_SHRINK)
+        height = np.linalg.norm(np.cross(x, y), axis=1) / width
+    scale = np.column_stack([width, np.maximum(height, _LEAST_SHRINK)])
+    return np.where(np.isfinite(scale).all(axis=1, keepdims=True), scale, 1.0)
 
 
 def _earth_centred(lon_lat: FloatArray) -> FloatArray:
@@ -393,10 +382,20 @@ def _earth_centred(lon_lat: FloatArray) -> FloatArray:
         return np.column_stack([across * np.cos(lon), across * np.sin(lon), up])
 
 
-def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> tuple[float, float]:
-    """Return the metres per map unit along x and y at a position (1 without a CRS)."""
-    # The only pixel of this grid is centred on the position.
-    return Grid(Affine.translation(*(np.asarray(xy) - 0.5)), crs, 1, 1).metres_per_unit
+def metres_per_unit_at(xy: ArrayLike, crs: CRS | None) -> FloatArray:
+    """Return the metres per map unit along x and y at positions, both (n, 2); 1 without a CRS."""
+    places = np.asarray(xy, float).reshape(-1, 2)
+    if crs is None:
+        return np.ones_like(places)
+    if crs.is_geographic:
+        degrees = _degrees_per_unit(crs)
+        return degrees * _metres_per_degree(places[:, 1] * degrees)
+    unit_m = float(crs.linear_units_factor[1])
+    scale = _scale_on_the_ground(places, unit_m, crs)
+    if 'PROJECTION["Mercator' not in crs.to_wkt():
+        is_for_surveys = (np.abs(scale - 1) <= _SURVEY_SCALE).all(axis=1, keepdims=True)
+        scale = np.where(is_for_surveys, 1.0, scale)
+    return scale * unit_m
 
 
 def require_both_or_none(one: CRS | None, other: CRS | None, names: str) -> None:

@@ -154,7 +154,7 @@ def _registered_grid(
     centre = corners.mean(axis=0)
     if not np.isfinite(centre).all():
         raise NoOverlapError("the footprint of the image lies outside of the map's projection")
-    metres = np.array(metres_per_unit_at(centre, crs))
+    metres = metres_per_unit_at(centre, crs)[0]
     if pixel_size_m is None:
         along, across = corners[2] - corners[0], corners[3] - corners[1]
         area = abs(along[0] * across[1] - along[1] * across[0]) / 2

@@ -207,7 +207,7 @@ class TiePointEvidence:
         """Fit a model in metres, so that rigid ones preserve shapes also on maps in degrees."""
         reference_xy = self.points.reference_xy[self.taken]
         centre = reference_xy.mean(axis=0)
-        width, height = metres_per_unit_at(centre, self.points.crs)
+        width, height = metres_per_unit_at(centre, self.points.crs)[0]
         metres = Affine(1 / width, 0, centre[0], 0, 1 / height, centre[1])
         xy, nominal_xy = (
             apply_affine(~metres, places) for places in (reference_xy, self._nominal_xy[self.taken])

@@ -76,9 +76,10 @@ class AssessmentReport(Page):
             measured.check_points,
         )
         # Outliers are shown, too, as check points that disagree.
-        shown = [replace(part, counted=part.placed, error_m=None) for part in parts]
-        errors = PointErrors.concatenate(shown)
-        if not errors.used.any():
+        shown = [replace(p, counted=p.placed, error_m=None) for p in parts if p.placed.any()]
+        if not shown:
             return None
-        grid = self.transform.input_grid
-        return {**figures.shown_residuals(errors, grid), "grid": grid}
+        # The tolerance is that of all parts.
+        errors, grid = PointErrors.concatenate(shown), self.transform.input_grid
+        residuals = figures.shown_residuals(errors, grid)
+        return {**residuals, "grid": grid, "tolerance_px": errors.tolerance_px}

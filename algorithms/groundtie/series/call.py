@@ -218,7 +218,9 @@ def _require_apart(listed: tuple[Listed, ...], folder: Path) -> None:
     for date in listed:
         if not isinstance(date.raster, Path):
             continue
-        if folder in (path.parent for path in (date.raster.resolve(), *sources_of(date.raster))):
+        files = date.raster.resolve(), *sources_of(date.raster)
+        # A link counts where it lies, too: the next run would find the outputs beside it.
+        if folder in (date.raster.parent.resolve(), *(path.parent for path in files)):
             raise SameFileError(f"the output folder holds an input: {date.raster}")
 
 

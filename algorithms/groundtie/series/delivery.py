@@ -21,7 +21,6 @@ from ..registration.verdict import Verdict
 from ..report.stac import stac_item
 from ..runs import RUN, digest, has_written, run_tags
 from ..version import __version__
-from .frame import sigma_px
 from .series import TABLE_COLUMNS, Series, SeriesDate
 from .stored import SERIES_JSON, StoredDate, StoredSeries, forget_unfinished, state_of
 
@@ -147,7 +146,7 @@ class SeriesFiles:
         covariance = one.verdict.covariance
         assert covariance is not None
         quality = {
-            "accuracy:geometric_rmse": sigma_px(covariance) * series.frame.grid.pixel_size_m,
+            "accuracy:geometric_rmse": series.frame.sigma_m(covariance),
             "groundtie:worst_loop_px": one.verdict.worst_loop_px,
             "groundtie:model": one.transform.model.kind,
         }

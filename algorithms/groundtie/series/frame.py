@@ -10,7 +10,15 @@ import numpy as np
 from affine import Affine
 
 from ..geometry.models import Frame, PolynomialModel, monomials
-from ..rasters.grid import FloatArray, Grid, PointFunction, compose, mesh, reproject
+from ..rasters.grid import (
+    FloatArray,
+    Grid,
+    PointFunction,
+    compose,
+    mesh,
+    metres_per_unit_at,
+    reproject,
+)
 
 # Parameters of a displacement: the shift, and its change along either axis, (x, y) each.
 PARAMETERS = 6
@@ -117,6 +125,17 @@ class SeriesFrame:
             return PolynomialModel("translation", self.square, coefficients[:1])
         return PolynomialModel("affine", self.square, coefficients)
 
+    @property
+    def metres_per_unit(self) -> FloatArray:
+        """Metres per map unit along x and y at the square's centre, shape (2,)."""
+        return metres_per_unit_at(self.square.leave(np.zeros((1, 2))), self.grid.crs)[0]
+
+    def sigma_m(self, covariance: FloatArray) -> float:
+        """Return `sigma_px` in metres (in pixels without georeferencing)."""
+        t = self.grid.transform
+        ground = self.metres_per_unit[:, None] * [[t.a, t.b], [t.d, t.e]]
+        return _deviation(ground @ _spread(covariance) @ ground.T)
+
     def moved_grid(self, grid: Grid, displacement: FloatArray) -> Grid:
         """Return a date's grid, shifted to undo a displacement at the frame's centre."""
         ground = self.square.leave(np.zeros((1, 2)))
@@ -134,8 +153,18 @@ def rms_px(displacement: FloatArray) -> float:
 
 def sigma_px(covariance: FloatArray) -> float:
     """Return the standard deviation over the frame, both axes together, by a covariance (6, 6)."""
-    variances = np.diag(covariance).reshape(3, 2).sum(axis=1)
-    return float(np.sqrt(max(variances @ [1, 1 / 3, 1 / 3], 0.0)))
+    return _deviation(_spread(covariance))
+
+
+def _spread(covariance: FloatArray) -> FloatArray:
+    """Return the mean covariance of positions over the frame, (2, 2), of a displacement's."""
+    # u and v are uniform over ±1, with a variance of 1/3, and independent.
+    over_frame = [1, 1 / 3, 1 / 3]
+    return np.asarray(np.einsum("iaib,i->ab", covariance.reshape(3, 2, 3, 2), over_frame))
+
+
+def _deviation(spread: FloatArray) -> float:
+    return float(np.sqrt(max(np.trace(spread), 0.0)))
 
 
 def _box(grid: Grid, date: Grid) -> FloatArray:

@@ -116,7 +116,7 @@ class SeriesDate:
         if not frame.grid.is_georeferenced:  # there are no metres
             return values
         centre = frame.square.leave(np.array([[0.0, 0.0], displacement[:2] / frame.half_px]))
-        shift_m = (centre[1] - centre[0]) * frame.grid.metres_per_unit
+        shift_m = (centre[1] - centre[0]) * frame.metres_per_unit
         return values | {"shift_x_m": float(shift_m[0]), "shift_y_m": float(shift_m[1])}
 
 
