@@ -182,6 +182,34 @@ def test_a_terrain_model_may_cover_a_part_of_the_image(tmp_path: Path) -> None:
         assert np.isfinite(sensor_grid_of(tmp_path, part).pixel_to_map(CENTRE_AND_CORNER)).all()
 
 
+@pytest.mark.parametrize("void", [0, 3])
+def test_ground_at_the_border_of_the_terrain_model_is_met(tmp_path: Path, void: int) -> None:
+    """On cliffs at either border, 500 m high, where lines of sight at other heights pass it.
+
+    Beyond the border there is nothing, or pixels without a value.
+    """
+    image = write_positions(tmp_path / "image.tif", RPC)
+    middle = reproject(np.array([[9.0, 45.15]]), LON_LAT, UTM)[0]
+    grid = Grid(Affine(10, 0, middle[0] - 200, 0, -10, middle[1] + 600), UTM, 40, 120)
+    to_border = np.minimum(np.arange(40), np.arange(40)[::-1]) - void
+    heights = np.tile(np.clip(650.0 - 100 * to_border, 100, 600), (120, 1)).astype(np.float32)
+    heights[:, to_border < 0] = -32768
+    dem_path = write_raster(tmp_path / "dem.tif", heights, grid, nodata=-32768)
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(dem_path) as dem,
+    ):
+        orientation = orient(source, RPC, UTM, dem)
+        columns, rows = np.linspace(void, 39 - void, 200), np.linspace(30, 90, 20)
+        xy = grid.pixel_to_map(np.stack(np.meshgrid(columns, rows), -1).reshape(-1, 2))
+        px = orientation.to_px(xy)
+        seen = source.grid.contains(px)
+        assert seen.sum() > 2000
+        # A line of sight may meet other ground, too: whatever it meets is shown there.
+        again = orientation.to_px(orientation.to_map(px[seen]))
+    np.testing.assert_allclose(again, px[seen], atol=1e-3)
+
+
 CENTRE_AND_CORNER = [[300.0, 250.0], [5.0, 5.0]]
 
 
