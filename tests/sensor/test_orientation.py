@@ -112,6 +112,25 @@ def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(
     assert np.abs(dense - single).max() < 2e-3
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 45.0])
+@pytest.mark.parametrize("pixel_m", [60.0, 100.0, 300.0])
+def test_an_image_of_a_few_pixels_is_found_wherever_they_lie(
+    tmp_path: Path, pixel_m: float, turn_deg: float
+) -> None:
+    with oriented(tmp_path) as orientation:
+        centre = orientation.to_map([[300.0, 250.0]])[0]
+        for shift in range(0, 32, 5):
+            turn = compose(Affine.translation(*centre), Affine.rotation(turn_deg))
+            scaled = compose(turn, Affine.scale(pixel_m, -pixel_m))
+            transform = compose(scaled, Affine.translation(-60 - shift, -70 - shift))
+            grid = Grid(transform, UTM, 150, 130)
+            dense = DenseOrientation(orientation).coordinates(grid)
+            single = orientation.to_px(pixels(grid)).T.reshape(dense.shape)
+            inside = np.all((single > 0) & (single < [[[600]], [[500]]]), axis=0)
+            assert inside.any()
+            np.testing.assert_allclose(dense[:, inside], single[:, inside], atol=2e-3)
+
+
 def test_far_places_are_not_in_the_image(tmp_path: Path) -> None:
     with oriented(tmp_path, pixel_m=100.0) as orientation:
         near = orientation.to_map([[300.0, 250.0]])

@@ -60,6 +60,8 @@ class Orientation:
         Share of the image whose heights are the terrain model's own values.
     filled_share
         Share of the image whose heights are filled into voids from their rims.
+    domain
+        Least width, in the map's unit, of the area around the image that `to_lon_lat` is made for.
     """
 
     rpc: RPC
@@ -68,6 +70,7 @@ class Orientation:
     to_lon_lat: PointFunction
     known_share: float = 1.0
     filled_share: float = 0.0
+    domain: float = np.inf
 
     def to_px(self, xy: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of map positions.
@@ -213,7 +216,8 @@ def orient(
     def exact(places: FloatArray) -> FloatArray:
         return near_longitude(reproject(places, crs, LON_LAT), rpc.offset[0], LON_LAT)
 
-    fast = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
+    low, high = xy.min(axis=0) - around, xy.max(axis=0) + around
+    fast = smooth_map(exact, low, high, _TOLERANCE_DEG)
     x = float(np.median(xy[:, 0]))
     return Orientation(
         rpc,
@@ -222,6 +226,7 @@ def orient(
         lambda places: fast(near_longitude(places, x, crs)),
         measured,
         known - measured,
+        float((high - low).min()),
     )
 
 
