@@ -120,8 +120,8 @@ def find_regions(
 
 def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
     """Return the broadened skeleton, the wide regions, and the border of both."""
-    broad = grown(lines, max(round(width_m / pixel_m / 2), 1))
-    return grown(broad | wide, max(round(_BORDER_M / pixel_m), 1))
+    broad = grown(lines, disc(max(round(width_m / pixel_m / 2), 1)))
+    return grown(broad | wide, disc(max(round(_BORDER_M / pixel_m), 1)))
 
 
 def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tuple[Mask, Mask]:
