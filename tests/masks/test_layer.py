@@ -6,12 +6,14 @@ from typing import Any
 import fiona
 import numpy as np
 import pytest
+from affine import Affine
 from raster_files import UTM, utm_grid, write_raster
 from rasterio.warp import transform
 
 from groundtie.errors import GeoreferencingError, VectorLayerError
 from groundtie.masks.layer import read_layer
 from groundtie.masks.scene import Scene
+from groundtie.rasters.grid import LON_LAT, Grid
 from groundtie.rasters.reading import Window, open_raster
 
 GRID = utm_grid(80, 60, 2.0)
@@ -77,6 +79,23 @@ def test_a_line_is_as_wide_as_told_and_holds_for_every_window(scene: Scene, tmp_
     np.testing.assert_array_equal(chosen, expected)
     part = mask.select(Window(13, 25, 40, 6)).part
     np.testing.assert_array_equal(part, expected[25:31, 13:53])
+
+
+@pytest.mark.parametrize(("latitude", "across"), [(0.0, 11), (60.0, 23)])
+def test_a_line_is_as_wide_in_degrees(tmp_path: Path, latitude: float, across: int) -> None:
+    """At 60° a pixel's width is half of its height; lines have odd numbers of pixels."""
+    step = 1 / 111_195
+    grid = Grid(Affine(step, 0, 10, 0, -step, latitude + 50 * step), LON_LAT, 101, 101)
+    image = write_raster(tmp_path / "a.tif", np.ones((101, 101), np.uint8), grid)
+    scene = Scene.of(open_raster(image))
+    for end, axis, wide_px in (((50, 100), 1, across), ((100, 50), 0, 11)):
+        start = (end[0] % 100, end[1] % 100)
+        line = [(float(x), float(y)) for x, y in grid.pixel_to_map([start, end])]
+        path = layer_of(
+            tmp_path / f"{axis}.geojson", {"type": "LineString", "coordinates": line}, "EPSG:4326"
+        )
+        chosen = read_layer(path, scene, 11.2).select(scene.whole).part
+        assert np.take(chosen, 50, axis=1 - axis).sum() == wide_px
 
 
 def test_a_layer_in_another_crs_lies_where_it_should(scene: Scene, tmp_path: Path) -> None:

@@ -103,6 +103,24 @@ def test_larger_scenes_are_looked_at_with_larger_pixels(
     assert chosen.part[town.roofs].mean() < 0.1
 
 
+@pytest.mark.parametrize("factor", [1, 2, 3, 4, 5])
+def test_as_many_percent_take_no_part_in_larger_scenes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, factor: int
+) -> None:
+    """Fields under speckle of three looks, of four levels."""
+    random = np.random.default_rng(0)
+    side, fields = 960, 6
+    levels = np.array([0.5, 1, 2, 4])[random.integers(0, 4, (fields, fields))]
+    power = np.kron(levels, np.ones((side // fields,) * 2)) * random.gamma(3, 1 / 3, (side, side))
+    scene = scene_of(tmp_path / "a.tif", (100 * np.sqrt(power)).astype(np.float32))
+    monkeypatch.setattr(reduced, "_MOST_PIXELS", (side // factor) ** 2)
+    found = find_regions(scene, high_percent=10.0)
+    assert found.part.factor == factor
+    inside = found.part.cut(scene.whole)
+    assert inside.mean() > 0.2
+    assert found.select(scene.whole).part.sum() / inside.sum() == pytest.approx(0.9, abs=0.02)
+
+
 def test_what_holds_no_data_takes_no_part(town: Town, tmp_path: Path) -> None:
     image = town.amplitude.copy()
     image[:, :100] = 0

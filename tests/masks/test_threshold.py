@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rasterio
+from affine import Affine
 from raster_files import utm_grid, write_raster
 from scipy.ndimage import distance_transform_edt
 
@@ -12,6 +13,7 @@ from groundtie.errors import ParameterError, RasterContentError
 from groundtie.masks.scene import Scene, write_mask
 from groundtie.masks.threshold import ThresholdMask
 from groundtie.rasters.atomic import Outputs
+from groundtie.rasters.grid import LON_LAT, Grid
 from groundtie.rasters.reading import Window, open_raster
 
 
@@ -46,8 +48,27 @@ def test_so_many_percent_of_the_blocks_take_no_part(
 def test_a_mask_grows_by_a_distance(tmp_path: Path, image: np.ndarray) -> None:
     scene = scene_of(tmp_path / "a.tif", image)
     plain = ThresholdMask.of(scene, 3).select(scene.whole).part
-    grown = ThresholdMask.of(scene, 3, grow_px=5).select(scene.whole).part
+    grown = ThresholdMask.of(scene, 3, grow_m=5).select(scene.whole).part
     np.testing.assert_array_equal(grown, distance_transform_edt(plain) > 5.5)
+
+
+@pytest.mark.parametrize("latitude", [0.0, 50.0, 70.0])
+def test_a_mask_grows_by_metres_in_degrees(tmp_path: Path, latitude: float) -> None:
+    image = np.ones((301, 301), np.float32)
+    image[148:152, 148:152] = 100
+    step = 1e-5
+    grid = Grid(Affine(step, 0, 10, 0, -step, latitude + 150 * step), LON_LAT, 301, 301)
+    scene = Scene.of(open_raster(write_raster(tmp_path / "a.tif", image, grid)))
+    out = ~ThresholdMask.of(scene, 0.02, grow_m=30).select(scene.whole).part
+    rows, cols = np.nonzero(out)
+    # A degree on a sphere; the ellipsoid's differ by less than 0.7 %.
+    side_m = step * 111_195 * np.array([np.cos(np.deg2rad(latitude)), 1])
+    beyond_m = (np.array([np.ptp(cols), np.ptp(rows)]) + 1 - 4) / 2 * side_m
+    np.testing.assert_allclose(beyond_m, 30, atol=side_m.max() / 2 + 0.2)
+    # Within the rounded corners of a square of so many pixels.
+    assert out.sum() * side_m.prod() == pytest.approx(
+        np.pi * 30**2 + 4 * side_m @ [60, 60] + 16 * side_m.prod(), rel=0.03
+    )
 
 
 @pytest.mark.parametrize("grow", [0, 3])

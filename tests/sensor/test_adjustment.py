@@ -86,6 +86,21 @@ def test_estimates_scatter_as_their_covariance_says() -> None:
     assert np.all((scatter / told > 0.6) & (scatter / told < 1.5))
 
 
+@pytest.mark.parametrize(("kind", "count"), [("shift", 3), ("shift", 5), ("affine", 12)])
+def test_few_points_tell_the_variance_of_all(kind: str, count: int) -> None:
+    """Their covariances state nothing: the estimate of the variance must be unbiased."""
+    noise_px, excess = 0.4, []
+    for seed in range(200):
+        points = control(kind, count)
+        noise = np.random.default_rng(seed).normal(0, noise_px, (count, 2))
+        points.found_px[:] = points.expected_px + noise
+        points.covariance_px2[:] = np.eye(2) * 1e-8
+        excess.append(adjust(points, kind).sigma_px ** 2)
+    # The variance of n - terms free errors an axis; four standard deviations of its mean.
+    free = 2 * (count - TERMS[kind]) * len(excess)
+    assert np.mean(excess) == pytest.approx(noise_px**2, rel=4 * np.sqrt(2 / free))
+
+
 @pytest.mark.parametrize("times", [0.05, 1.0, 5.0])
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_model_does_not_depend_on_the_unit_of_covariances(kind: str, times: float) -> None:

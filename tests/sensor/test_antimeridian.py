@@ -15,6 +15,7 @@ from rasterio.warp import transform
 from rpc_models import camera_rpc, rasterio_project, to_rasterio, write_positions
 
 import groundtie
+from groundtie.errors import GeoreferencingError
 from groundtie.rasters.grid import LON_LAT, Grid, apply_affine
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.heights import terrain_heights
@@ -69,6 +70,22 @@ def test_an_orthoimage_is_whole(tmp_path: Path, longitude: float, crs: str) -> N
     image = write_positions(tmp_path / "image.tif", rpc)
     groundtie.orthorectify(image, tmp_path / "ortho.tif", height=300.0, crs=crs)
     require_positions(tmp_path / "ortho.tif", rpc, lambda lon: np.full(len(lon), 300.0))
+
+
+@pytest.mark.parametrize("longitude", [180.0, -180.0, 179.998])
+@pytest.mark.parametrize("crs", ["EPSG:3857", "EPSG:6933", "ESRI:54008"])
+def test_a_map_that_ends_within_the_image_is_refused(
+    tmp_path: Path, longitude: float, crs: str
+) -> None:
+    image = write_positions(tmp_path / "image.tif", across(longitude))
+    ortho = tmp_path / "ortho.tif"
+    with pytest.raises(GeoreferencingError, match=r"both edges of the map .* take another CRS"):
+        groundtie.orthorectify(image, ortho, height=300.0, crs=crs)
+    # Beside the edge, it is a map as any.
+    write_positions(image, across(longitude - 0.1))
+    groundtie.orthorectify(image, ortho, height=300.0, crs=crs)
+    with rasterio.open(ortho) as written:
+        assert np.isfinite(written.read(1)).sum() == pytest.approx(600 * 500, rel=0.05)
 
 
 def require_positions(path: Path, rpc: RPC, heights: Callable[[np.ndarray], np.ndarray]) -> None:

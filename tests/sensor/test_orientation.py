@@ -112,6 +112,25 @@ def test_houses_in_a_surface_model_are_seen_by_the_dense_positions(
     assert np.abs(dense - single).max() < 2e-3
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 45.0])
+@pytest.mark.parametrize("pixel_m", [60.0, 100.0, 300.0])
+def test_an_image_of_a_few_pixels_is_found_wherever_they_lie(
+    tmp_path: Path, pixel_m: float, turn_deg: float
+) -> None:
+    with oriented(tmp_path) as orientation:
+        centre = orientation.to_map([[300.0, 250.0]])[0]
+        for shift in range(0, 32, 5):
+            turn = compose(Affine.translation(*centre), Affine.rotation(turn_deg))
+            scaled = compose(turn, Affine.scale(pixel_m, -pixel_m))
+            transform = compose(scaled, Affine.translation(-60 - shift, -70 - shift))
+            grid = Grid(transform, UTM, 150, 130)
+            dense = DenseOrientation(orientation).coordinates(grid)
+            single = orientation.to_px(pixels(grid)).T.reshape(dense.shape)
+            inside = np.all((single > 0) & (single < [[[600]], [[500]]]), axis=0)
+            assert inside.any()
+            np.testing.assert_allclose(dense[:, inside], single[:, inside], atol=2e-3)
+
+
 def test_far_places_are_not_in_the_image(tmp_path: Path) -> None:
     with oriented(tmp_path, pixel_m=100.0) as orientation:
         near = orientation.to_map([[300.0, 250.0]])
@@ -180,6 +199,34 @@ def test_a_terrain_model_may_cover_a_part_of_the_image(tmp_path: Path) -> None:
         # Its typical height is wrong by what the relief is.
         assert np.hypot(*(nominal - xy)[1]) < 200
         assert np.isfinite(sensor_grid_of(tmp_path, part).pixel_to_map(CENTRE_AND_CORNER)).all()
+
+
+@pytest.mark.parametrize("void", [0, 3])
+def test_ground_at_the_border_of_the_terrain_model_is_met(tmp_path: Path, void: int) -> None:
+    """On cliffs at either border, 500 m high, where lines of sight at other heights pass it.
+
+    Beyond the border there is nothing, or pixels without a value.
+    """
+    image = write_positions(tmp_path / "image.tif", RPC)
+    middle = reproject(np.array([[9.0, 45.15]]), LON_LAT, UTM)[0]
+    grid = Grid(Affine(10, 0, middle[0] - 200, 0, -10, middle[1] + 600), UTM, 40, 120)
+    to_border = np.minimum(np.arange(40), np.arange(40)[::-1]) - void
+    heights = np.tile(np.clip(650.0 - 100 * to_border, 100, 600), (120, 1)).astype(np.float32)
+    heights[:, to_border < 0] = -32768
+    dem_path = write_raster(tmp_path / "dem.tif", heights, grid, nodata=-32768)
+    with (
+        open_raster(image, allow_sensor_geometry=True) as source,
+        open_raster(dem_path) as dem,
+    ):
+        orientation = orient(source, RPC, UTM, dem)
+        columns, rows = np.linspace(void, 39 - void, 200), np.linspace(30, 90, 20)
+        xy = grid.pixel_to_map(np.stack(np.meshgrid(columns, rows), -1).reshape(-1, 2))
+        px = orientation.to_px(xy)
+        seen = source.grid.contains(px)
+        assert seen.sum() > 2000
+        # A line of sight may meet other ground, too: whatever it meets is shown there.
+        again = orientation.to_px(orientation.to_map(px[seen]))
+    np.testing.assert_allclose(again, px[seen], atol=1e-3)
 
 
 CENTRE_AND_CORNER = [[300.0, 250.0], [5.0, 5.0]]

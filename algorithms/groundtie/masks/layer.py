@@ -15,7 +15,7 @@ from ..geometry.vector_layers import read_vector_layer
 from ..rasters.grid import Grid
 from ..rasters.reading import Mask, Window
 from .scene import Scene, Selection
-from .threshold import grown
+from .threshold import ellipse, grown
 
 AREAS = ("Polygon", "MultiPolygon")
 _LINES = ("LineString", "MultiLineString")
@@ -34,7 +34,7 @@ class LayerMask:
     areas, lines
         GeoJSON geometries on the scene's map.
     reach_px
-        Half the width of the lines.
+        Half the width of the lines, in columns and in rows.
     is_outside
         Whether the area that it does not cover takes part instead.
     """
@@ -42,7 +42,7 @@ class LayerMask:
     scene: Scene
     areas: tuple[Any, ...]
     lines: tuple[Any, ...]
-    reach_px: int
+    reach_px: tuple[int, int]
     is_outside: bool = False
 
     def select(self, window: Window) -> Selection:
@@ -51,9 +51,9 @@ class LayerMask:
         An area covers the pixels whose centres lie in it. A line covers the pixels along it
         (Bresenham's algorithm) and those within `reach_px` of them.
         """
-        around = window.widened(self.reach_px)
-        along = grown(self._drawn(self.lines, around), self.reach_px)[window.slices_in(around)]
-        covered = self._drawn(self.areas, window) | along
+        around = window.widened(max(self.reach_px))
+        along = grown(self._drawn(self.lines, around), ellipse(*self.reach_px))
+        covered = self._drawn(self.areas, window) | along[window.slices_in(around)]
         valid = self.scene.read(window).valid
         return Selection(valid & (covered != self.is_outside), valid)
 
@@ -118,4 +118,6 @@ def read_layer(path: str | os.PathLike[str], scene: Scene, width_m: float) -> La
         tuple(geometry for geometry in every if geometry["type"] in kinds)
         for kinds in (AREAS, _LINES)
     )
-    return LayerMask(scene, areas, lines, int(width_m / scene.grid.pixel_size_m / 2))
+    # With the pixels along the line, the odd number of pixels that is nearest to the width.
+    across, down = (int(width_m / side_m / 2) for side_m in scene.grid.pixel_sides_m)
+    return LayerMask(scene, areas, lines, (across, down))

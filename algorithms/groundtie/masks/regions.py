@@ -64,7 +64,7 @@ class GroundRegions:
     skeleton_m
         Length of the skeleton.
     high
-        Largest grey value that takes part, of means over 4 × 4 pixels of the scene.
+        Largest grey value that takes part, of means over about 4 × 4 pixels of the scene.
     """
 
     regions: BlockMask
@@ -75,9 +75,11 @@ class GroundRegions:
 
     def select(self, window: Window) -> Selection:
         """Return which pixels of a window take part."""
-        around = window.widened(BLOCK_PX)
+        factor = self.part.factor
+        side_px = _mean_blocks(factor) * factor
+        around = window.widened(side_px)
         patch, inside = self.part.scene.read(around), window.slices_in(around)
-        chosen = self.part.cut(window) & (_smooth(patch)[inside] <= self.high)
+        chosen = self.part.cut(window) & (_smooth(patch, side_px)[inside] <= self.high)
         valid = patch.valid[inside]
         return Selection(chosen & valid, valid)
 
@@ -112,7 +114,7 @@ def find_regions(
     even = _without_holes(longs, round(_SMALLEST_M2 / pixel_m**2), max(round(_EVEN_M / pixel_m), 1))
     lines = pruned(skeleton(even), round(width_m / pixel_m / 2))
     part = _broadened(lines, wide, width_m, pixel_m) & image.patch.valid
-    inside = _smooth(image.patch)[part]
+    inside = _smooth(image.patch, _mean_blocks(image.factor))[part]
     high = float(np.percentile(inside, 100 - high_percent)) if inside.size else np.inf
     regions, lined, kept = (image.mask(blocks) for blocks in (longs | wide, lines, part))
     return GroundRegions(regions, lined, kept, _length_px(lines) * pixel_m, high)
@@ -120,8 +122,8 @@ def find_regions(
 
 def _broadened(lines: Mask, wide: Mask, width_m: float, pixel_m: float) -> Mask:
     """Return the broadened skeleton, the wide regions, and the border of both."""
-    broad = grown(lines, max(round(width_m / pixel_m / 2), 1))
-    return grown(broad | wide, max(round(_BORDER_M / pixel_m), 1))
+    broad = grown(lines, disc(max(round(width_m / pixel_m / 2), 1)))
+    return grown(broad | wide, disc(max(round(_BORDER_M / pixel_m), 1)))
 
 
 def _kept_regions(image: ReducedScene, width_m: float, progress: Progress) -> tuple[Mask, Mask]:
@@ -170,10 +172,18 @@ def _without_holes(mask: Mask, smallest_px: int, radius_px: int) -> Mask:
     return np.asarray((even > 0) | small[labels])
 
 
-def _smooth(patch: Patch) -> NDArray[np.float32]:
-    """Return the mean over a block's size around each pixel; invalid ones count as 0."""
+def _mean_blocks(factor: int) -> int:
+    """Return the side, in blocks of so many pixels, of the means that tell the brightest pixels.
+
+    A limit holds only for means over as many pixels: of more, fewer are as bright.
+    """
+    return max(BLOCK_PX // factor, 1)
+
+
+def _smooth(patch: Patch, side_px: int) -> NDArray[np.float32]:
+    """Return the mean over a square around each pixel; invalid ones count as 0."""
     known = np.where(patch.valid, patch.values, np.float32(0))
-    return np.asarray(cv2.blur(known, (BLOCK_PX, BLOCK_PX)))
+    return np.asarray(cv2.blur(known, (side_px, side_px)))
 
 
 def _length_px(lines: Mask) -> float:

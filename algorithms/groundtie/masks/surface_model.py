@@ -30,7 +30,7 @@ from .object_heights import (
 )
 from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, radar_echoes
 from .scene import Scene, Selection, write_tiles
-from .threshold import grown
+from .threshold import disc, grown
 
 # Brightness of shadow relative to ground; correlation with an image hardly depends on it.
 _SHADOW = np.float32(0.1)
@@ -88,7 +88,7 @@ class SurfaceGround:
             found += _not_shown(heights, view, self.scene.grid)
         reasons = np.zeros(known.shape, np.uint8)
         for reason, where in found:
-            reasons[grown(where, _GROWN_PX)] |= np.uint8(reason)
+            reasons[grown(where, disc(_GROWN_PX))] |= np.uint8(reason)
         return reasons[inside]
 
     def level(self, window: Window, view: View) -> FloatImage:

@@ -151,7 +151,12 @@ def row_strips(height: int, width: int) -> Iterator[slice]:
         yield slice(first, min(first + lines, height))
 
 
-def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_PX) -> Lattice:
+def lattice(
+    grid: Grid,
+    function: PointFunction,
+    tolerance: float = _TOLERANCE_PX,
+    domain_px: float = np.inf,
+) -> Lattice:
     """Evaluate a function on a lattice, refined until it interpolates well midway between nodes.
 
     Parameters
@@ -163,8 +168,12 @@ def lattice(grid: Grid, function: PointFunction, tolerance: float = _TOLERANCE_P
         not finite become NaN. It is evaluated up to a cell beyond the grid.
     tolerance
         Largest error.
+    domain_px
+        Width, in pixels, of the area where the function is known; if it is small, the first nodes
+        are so near that one lies in it.
     """
-    step = _FIRST_STEP
+    # A circle as wide as a square's diagonal holds one of its corners, however it is turned.
+    step = int(np.clip(np.sqrt(2) * domain_px, 1, _FIRST_STEP))
     while step > 1:
         # Also evaluated halfway between nodes, along rows, columns and both.
         finer = _evaluate(grid, function, step, 2)

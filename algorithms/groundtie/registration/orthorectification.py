@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ..context import Context
-from ..errors import NoOverlapError
+from ..errors import GeoreferencingError, NoOverlapError
 from ..rasters.delivery import warp_raster
-from ..rasters.grid import Grid, near_longitude
+from ..rasters.grid import FloatArray, Grid, crs_name, near_longitude
 from ..rasters.target_grids import covering_grid, registered_grid
 from ..sensor.dense import DenseOrientation
+from ..sensor.orientation import Orientation
 from .sensor_input import OrientedImage
 
 # Most places along a side of an image at which its border is projected: more than a sensor's line
@@ -46,6 +49,8 @@ def write_orthoimage(
     ------
     NoOverlapError
         The image shows nothing of the grid that was given, or no height is known there.
+    GeoreferencingError
+        Without a grid: the image lies across the edge of its map.
     """
     source, by = image.source, image.orientation
     if grid is None:
@@ -53,6 +58,11 @@ def write_orthoimage(
         pixels = source.grid.on_own_pixels()
         # Relief may displace any pixel of the border outwards.
         border = pixels.outline(min(max(pixels.size), _MOST_ALONG))
+        if _is_torn(by, border):
+            raise GeoreferencingError(
+                f"{source.path} lies at both edges of the map {crs_name(by.crs)}, as across the "
+                "antimeridian: take another CRS, such as that of its UTM zone"
+            )
         # A wall or a steep slope must not determine the pixel size.
         grid = registered_grid(
             pixels, by.to_level_map, by.crs, pixel_size, by.to_nominal_map(border)
@@ -68,3 +78,16 @@ def write_orthoimage(
             "the ground is not known, or the RPCs do not hold there"
         )
     return grid
+
+
+def _is_torn(by: Orientation, border: FloatArray) -> bool:
+    """Return whether the border of an image, pixels (n, 2), lies at both edges of a map.
+
+    Midway between two pixels, positions are midway on the map, too, unless its edge lies between:
+    then they are beside either of the two, half of their distance off.
+    """
+    xy = by.to_level_map(border)
+    ends = np.stack([xy.argmin(axis=0), xy.argmax(axis=0)])
+    middle = by.to_level_map(border[ends].mean(axis=0))
+    apart, off = np.ptp(xy[ends], axis=0), middle - xy[ends].mean(axis=0)
+    return bool((np.hypot(*off.T) > np.hypot(*apart.T) / 4).any())

@@ -176,7 +176,8 @@ def _without_improbable(control: Control, kind: str) -> tuple[NDArray[np.bool_],
     for _ in range(_STEPS):
         mixture = fit_mixture(residuals, (2 * reach) ** 2, _SIGMA_RANGE_PX)
         same = np.array_equal(used, mixture.inliers)
-        used, sigma = mixture.inliers, _excess(control.take(mixture.inliers), mixture.sigma)
+        used = mixture.inliers
+        sigma = _excess(control.take(used), mixture.sigma, TERMS[kind])
         if same or used.sum() < TERMS[kind]:
             break
         residuals = control.residuals_px(_fit(control.take(used), kind, sigma))
@@ -192,10 +193,16 @@ def reach_px(farthest_px: float, size: tuple[int, int]) -> float:
     return float(np.clip(farthest_px, LEAST_REACH_PX, max(LEAST_REACH_PX, *size)))
 
 
-def _excess(control: Control, sigma_px: float) -> float:
-    """Return the standard deviation of points beyond their covariances, an axis."""
-    stated = np.trace(control.covariance_px2, axis1=1, axis2=2).mean() / 2 if len(control) else 0.0
-    return float(np.sqrt(max(sigma_px**2 - stated, 0.0)))
+def _excess(control: Control, residual_px: float, terms: int) -> float:
+    """Return the standard deviation of points beyond their covariances, an axis.
+
+    `residual_px` is that of residuals of a fit with `terms` parameters an axis. They are smaller
+    than the points' errors: n points leave n - terms of them free.
+    """
+    count = len(control)
+    stated = np.trace(control.covariance_px2, axis1=1, axis2=2).mean() / 2 if count else 0.0
+    variance = residual_px**2 * count / max(count - terms, 1)
+    return float(np.sqrt(max(variance - stated, 0.0)))
 
 
 def _fit(control: Control, kind: str, sigma_px: float) -> Bias:

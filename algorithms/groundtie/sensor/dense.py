@@ -40,7 +40,10 @@ class DenseOrientation:
         px = np.empty((2, grid.height, grid.width))
 
         def on_nodes(function: PointFunction, tolerance: float) -> Lattice:
-            return lattice(grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance)
+            domain_px = orientation.domain / max(grid.pixel_size)
+            return lattice(
+                grid, lambda xy: function(orientation.to_lon_lat(xy)), tolerance, domain_px
+            )
 
         heights = orientation.heights.on_grid(grid, on_nodes)
         if heights is None:

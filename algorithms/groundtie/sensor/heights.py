@@ -48,6 +48,11 @@ class ConstantHeight:
         """A height of the region."""
         return self.height_m
 
+    @property
+    def continued(self) -> ConstantHeight:
+        """These heights, which are known everywhere."""
+        return self
+
     def is_measured(self, lon_lat: FloatArray) -> NDArray[np.bool_]:
         """Return that the height is known everywhere, shape (n,)."""
         return np.ones(len(lon_lat), bool)
@@ -99,6 +104,11 @@ class TerrainHeights:
         """A height of the region: the median of the terrain model plus that of the geoid."""
         geoid = 0.0 if self.geoid is None else float(np.median(self.geoid.filled))
         return float(np.median(self.terrain.filled)) + geoid
+
+    @property
+    def continued(self) -> TerrainHeights:
+        """These heights, where they are not known those of the nearest rim of the terrain model."""
+        return replace(self, terrain=replace(self.terrain, fills_open=True, margin_px=np.inf))
 
     def is_measured(self, lon_lat: FloatArray) -> NDArray[np.bool_]:
         """Return where heights are the terrain model's own, not filled into voids, shape (n,)."""

@@ -60,6 +60,8 @@ class Orientation:
         Share of the image whose heights are the terrain model's own values.
     filled_share
         Share of the image whose heights are filled into voids from their rims.
+    domain
+        Least width, in the map's unit, of the area around the image that `to_lon_lat` is made for.
     """
 
     rpc: RPC
@@ -68,6 +70,7 @@ class Orientation:
     to_lon_lat: PointFunction
     known_share: float = 1.0
     filled_share: float = 0.0
+    domain: float = np.inf
 
     def to_px(self, xy: ArrayLike) -> FloatArray:
         """Return the image positions (col, row), shape (n, 2), of map positions.
@@ -109,14 +112,22 @@ class Orientation:
     def _ground(self, px: FloatArray) -> FloatArray:
         """Return longitude and latitude, (n, 2), of image positions; NaN where there is no ground.
 
-        The height at which the line of sight meets the ground is found by the secant method.
+        The height at which the line of sight meets the ground is found by the secant method. On the
+        way there, the line may pass over unknown ground.
         """
+        heights = self.heights.continued
+
+        def above_line(height: FloatArray) -> tuple[FloatArray, FloatArray]:
+            """Return positions of lines of sight at heights, and the ground's heights above."""
+            lon_lat = self.rpc.localise(px, height)
+            return lon_lat, heights.at(lon_lat) - height
+
         height = np.full(len(px), self.heights.typical_m)
-        lon_lat, above = self._above(px, height)
+        lon_lat, above = above_line(height)
         previous, previous_above, height = height, above, height + above
         with np.errstate(all="ignore"):
             for _ in range(_STEPS):
-                lon_lat, above = self._above(px, height)
+                lon_lat, above = above_line(height)
                 if np.nanmax(np.abs(above), initial=0.0) < _PRECISION_M:
                     break
                 slope = (above - previous_above) / (height - previous)
@@ -126,13 +137,8 @@ class Orientation:
                 )
                 step = np.where(np.abs(above) < _PRECISION_M, 0.0, step)
                 previous, previous_above, height = height, above, height + step
-        lon_lat[~(np.abs(above) < _PRECISION_M)] = np.nan
-        return lon_lat
-
-    def _above(self, px: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions of lines of sight at heights, and the ground's heights above them."""
-        lon_lat = self.rpc.localise(px, height)
-        return lon_lat, self.heights.at(lon_lat) - height
+        met = (np.abs(above) < _PRECISION_M) & np.isfinite(self.heights.at(lon_lat))
+        return np.where(met[:, None], lon_lat, np.nan)
 
 
 @dataclass(frozen=True)
@@ -210,7 +216,8 @@ def orient(
     def exact(places: FloatArray) -> FloatArray:
         return near_longitude(reproject(places, crs, LON_LAT), rpc.offset[0], LON_LAT)
 
-    fast = smooth_map(exact, xy.min(axis=0) - around, xy.max(axis=0) + around, _TOLERANCE_DEG)
+    low, high = xy.min(axis=0) - around, xy.max(axis=0) + around
+    fast = smooth_map(exact, low, high, _TOLERANCE_DEG)
     x = float(np.median(xy[:, 0]))
     return Orientation(
         rpc,
@@ -219,6 +226,7 @@ def orient(
         lambda places: fast(near_longitude(places, x, crs)),
         measured,
         known - measured,
+        float((high - low).min()),
     )
 
 

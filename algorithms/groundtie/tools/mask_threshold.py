@@ -31,9 +31,8 @@ def mask_threshold(
     """
     with open_raster(input) as source:
         scene = Scene.of(source, band)
-        grow_px = round(mask_growth / source.grid.pixel_size_m)
         searching = progress.part(0.0, 0.3)
-        mask = ThresholdMask.of(scene, mask_high_percent, mask_low_percent, grow_px, searching)
+        mask = ThresholdMask.of(scene, mask_high_percent, mask_low_percent, mask_growth, searching)
         with Outputs() as outputs:
             share = write_mask(scene, outputs.stage(output), mask.select, progress.part(0.3, 1.0))
     limits = {"low": mask.low, "high": mask.high}
