@@ -151,15 +151,18 @@ def leaving(left: Survey | None = None, sameness: Sameness = DRAWN_OVER, **more:
     return Rest(SharedContent(sameness, Sensors.CAMERAS), more.pop("chips", 49), left, **more)
 
 
-def in_common(sensors: Sensors, left: Survey, without_edges: Survey | None = None) -> Rest:
+def in_common(
+    sensors: Sensors, left: Survey, without_edges: Survey | None = None, brighter: float = 0.0
+) -> Rest:
     """Return what chips show without what two images have in common, if only a little."""
-    shared = SharedContent(replace(DRAWN_OVER, area=0.1), sensors)
+    shared = SharedContent(replace(DRAWN_OVER, area=0.1, brighter=brighter), sensors)
     return Rest(shared, 49, left, without_edges=without_edges)
 
 
-def left_of_two_sensors(*heights: float) -> Rest:
+def left_of_two_sensors(*heights: float, brighter: float = 0.0) -> Rest:
     """Return how high chips are without windows that vary alike, and without edges."""
-    return in_common(Sensors.DIFFERENT, *(survey(height=height) for height in heights))
+    surveys = (survey(height=height) for height in heights)
+    return in_common(Sensors.DIFFERENT, *surveys, brighter=brighter)
 
 
 def facts(

@@ -27,6 +27,7 @@ from groundtie.registration.rules.survey import (
     REST_PEAK_DEVIATIONS,
     deviations_elsewhere,
     deviations_of_unexplained,
+    height_of_else,
 )
 from groundtie.similarity.surface import SimilaritySettings
 
@@ -280,6 +281,29 @@ def test_beneath_one_deck_of_clouds_the_ground_is_asked(tmp_path: Path, context:
     ]
     rest = rest_of(tmp_path, *images, context)
     assert rest is not None and rest.shared.is_explained and rest.survey is not None
+
+
+@pytest.mark.parametrize("is_another_place", [True, False])
+@pytest.mark.slow
+def test_beneath_soft_clouds_of_one_shape_the_ground_is_asked(
+    is_another_place: bool, tmp_path: Path, context: Context
+) -> None:
+    """Their edges are too wide to coincide: without these, the clouds still match.
+
+    What is bright in one image is dark in the other.
+    """
+    deck = ndimage.gaussian_filter(texture(SIDE, SIDE, 30), 5)
+    share = np.clip((deck - np.quantile(deck, 0.75)) / deck.std(), 0, 1)
+    grounds = noisy(place(), 1, 0.6), noisy(-place()[:: -1 if is_another_place else 1], 2, 0.6)
+    reference, input = ((1 - share) * ground + 4 * share for ground in grounds)
+    offset = (0.4, -0.3)
+    moved = ndimage.shift(input, offset[::-1], mode="mirror")
+    rest = rest_of(tmp_path, reference, moved, context, offset, Sensors.DIFFERENT)
+    assert rest is not None and rest.survey is not None
+    assert rest.shared.sameness.may_be_clouds
+    assert (height_of_else(rest) < LEAST_OF_REST) == is_another_place
+    if is_another_place:
+        assert rest.without_edges is not None and rest.without_edges.height > LEAST_OF_REST
 
 
 @pytest.mark.slow

@@ -276,6 +276,19 @@ def test_what_two_sensors_have_in_common_is_not_all_that_matches(
 
 
 @pytest.mark.parametrize(
+    ("brighter", "height", "is_refused"),
+    [(0.81, 0.9, True), (0.79, 0.9, False), (-0.9, 0.9, False), (0.81, 1.1, False)],
+)
+def test_soft_edges_of_clouds_are_no_reason_to_accept(
+    brighter: float, height: float, is_refused: bool
+) -> None:
+    """Without its few coinciding edges a cloud is all there; without its windows it is not."""
+    rest = left_of_two_sensors(height, 4.0, brighter=brighter)
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["nothing else in common"] * is_refused
+
+
+@pytest.mark.parametrize(
     ("chips", "height", "is_refused"),
     [(49, 1.9, True), (49, 2.1, False), (190, 1.9, True), (200, 1.9, False)],
 )

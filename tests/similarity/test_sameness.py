@@ -6,6 +6,7 @@ from scipy.special import erf
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
+from groundtie.similarity.in_common import Look, sameness_of
 from groundtie.similarity.sameness import (
     Edges,
     Windows,
@@ -178,3 +179,19 @@ def test_invalid_pixels_are_no_part_of_windows() -> None:
     same = Windows.of(patch(one), patch(spoilt, hidden)).same
     assert not same[hidden].any()
     assert same[:20].all()
+
+
+@pytest.mark.parametrize("level", [40.0, -40.0])
+def test_what_varies_alike_is_as_much_brighter_as_it_is(level: float) -> None:
+    """Two levels with shares p and 1 − p are 1 / √(p (1 − p)) standard deviations apart."""
+    random, shape, width = np.random.default_rng(0), (200, 200), 60
+    common = random.normal(size=shape)
+    images = []
+    for gain in (1.0, 3.0):
+        image = random.normal(size=shape)
+        image[:, :width] = common[:, :width] + level
+        images.append(patch(gain * image + 7))
+    found = sameness_of([Look.of(*images)], [np.ones((2, 2, 9))])
+    share = width / shape[1]
+    expected = np.sign(level) / np.sqrt(share * (1 - share))
+    assert found.brighter == pytest.approx(expected, rel=0.05)

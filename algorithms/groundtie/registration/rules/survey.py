@@ -11,7 +11,7 @@ from ...matching.parts import CANOPIES_PX, CANOPIES_SHARE, ELSEWHERE_PX, LEAST_E
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
 from ...matching.surveys import LEAST_OF_REST, Rest, Surveys
-from ...similarity.in_common import MOVED_GROUND_SHARE
+from ...similarity.in_common import LEAST_BRIGHTER, MOVED_GROUND_SHARE
 from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
 from .pose import LEAST_HEIGHT
@@ -341,9 +341,11 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "nothing else in common",
         "the mean similarity of chips all over is below "
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
-        f"vary alike and without the surroundings of edges that coincide. Asked {UNMASKED}, and "
-        "not of two radar images, or of copies and views of one camera",
-        "suites real and attacks",
+        "vary alike and without the surroundings of edges that coincide; if what varies alike is "
+        f"brighter by {LEAST_BRIGHTER:g} standard deviations, as clouds are, without these windows "
+        f"alone. Asked {UNMASKED}, and not of two radar images, or of copies and views of one "
+        "camera",
+        "suites real, margins and attacks",
         WITHOUT,
         _nothing_else,
         is_final=True,
