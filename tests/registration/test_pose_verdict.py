@@ -55,6 +55,12 @@ class TestWhatAnExhaustiveSearchFound:
         assert evidence.rival_ratio is None
 
 
+@pytest.fixture(scope="module")
+def searched(windows: tuple[Patch, Patch], context: Context) -> PoseEvidence:
+    """Return the evidence for what another search found, which the exhaustive one does not see."""
+    return PoseEvidence.of(windows, ANY, [PoseFound(TRUTH, 99.0)], False, context)
+
+
 class TestWhatAnotherSearchFound:
     @pytest.mark.slow
     @pytest.mark.parametrize(
@@ -69,10 +75,9 @@ class TestWhatAnotherSearchFound:
         ],
     )
     def test_only_the_right_pose_is_accepted(
-        self, windows: tuple[Patch, Patch], context: Context, pose: Pose, accepted: bool
+        self, searched: PoseEvidence, pose: Pose, accepted: bool
     ) -> None:
-        found = [PoseFound(pose, 99.0)]
-        verdict = decide(PoseEvidence.of(windows, ANY, found, False, context))
+        verdict = decide(replace(searched, found=[PoseFound(pose, 99.0)]))
         assert verdict.accepted == accepted
         assert accepted or "prefers" in verdict.reason
 

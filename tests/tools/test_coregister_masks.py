@@ -30,15 +30,6 @@ from groundtie.tools.simulate import simulate
 
 
 @pytest.mark.slow
-def test_fields_are_left_without_a_mask(
-    simulated: Callable[[str], SimulatedFiles], tmp_path: Path
-) -> None:
-    pair = simulated("shift")
-    mask = coregister(pair.reference, pair.input, tmp_path / "out.tif").mask
-    assert mask.kind == "none" and "too few for a town" in mask.reason
-
-
-@pytest.mark.slow
 def test_a_layer_does_the_same_job(
     simulated: Callable[[str], SimulatedFiles], tmp_path: Path
 ) -> None:

@@ -220,7 +220,7 @@ def test_without_a_reference_and_with_untouched_pixels(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_radar_dates_are_registered_and_one_of_another_place_is_named(tmp_path: Path) -> None:
-    dates = write_dates(tmp_path / "dates", 5, 320, elsewhere=[3], looks=1.0)
+    dates = write_dates(tmp_path / "dates", 5, 220, elsewhere=[3], looks=1.0)
     found = coregister_series(tmp_path / "out", [dates.folder], reference=dates.files[0], **OPTIONS)
     names = dates.names
     assert all(one.date.is_radar for one in found.dates if one.date is not None)

@@ -21,7 +21,7 @@ from groundtie.geometry.transform import load_transform
 from groundtie.pose.pose import Pose
 from groundtie.rasters.grid import apply_affine
 from groundtie.studies.pose_searches import SEARCHES
-from groundtie.tools.estimate_rotation import estimate_rotation
+from groundtie.tools.estimate_rotation import RotationResult, estimate_rotation
 from groundtie.tools.warp import warp
 
 TRUTH = Pose(-68.0, 1.15, (12.0, -9.0))
@@ -44,6 +44,15 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
+def estimated(
+    plain: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[RotationResult, Path]:
+    """Return what is found without georeferencing, and the file of its transform."""
+    path = tmp_path_factory.mktemp("estimated") / "t.json"
+    return estimate_rotation(*plain, transform=path), path
+
+
+@pytest.fixture(scope="module")
 def other_place(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return files_of(tmp_path_factory.mktemp("other"), TRUTH, input_seed=77)
 
@@ -61,8 +70,8 @@ def turned_on_map(
 
 class TestWithoutGeoreferencing:
     @pytest.mark.slow
-    def test_the_pose_is_found(self, plain: tuple[Path, Path], tmp_path: Path) -> None:
-        result = estimate_rotation(*plain, transform=tmp_path / "t.json")
+    def test_the_pose_is_found(self, estimated: tuple[RotationResult, Path]) -> None:
+        result, path = estimated
         assert result.pose.rotation_deg == pytest.approx(TRUTH.rotation_deg, abs=0.3)
         assert result.pose.scale == pytest.approx(TRUTH.scale, rel=0.01)
         assert (result.right, result.down, result.unit) == (
@@ -78,13 +87,17 @@ class TestWithoutGeoreferencing:
         assert not any(" m)" in line for line in result.lines())
         px = np.array([[0.0, 0.0], [159, 0], [0, 149], [159, 149]])
         expected = apply_affine(TRUTH.between((150, 160), (170, 150)), px)
-        stored = load_transform(tmp_path / "t.json")
+        stored = load_transform(path)
         np.testing.assert_allclose(stored(px), expected, atol=1.5)
 
     @pytest.mark.slow
-    def test_warp_takes_the_transform(self, plain: tuple[Path, Path], tmp_path: Path) -> None:
-        estimate_rotation(*plain, transform=tmp_path / "t.json")
-        warp(plain[1], tmp_path / "out.tif", tmp_path / "t.json", reference=plain[0])
+    def test_warp_takes_the_transform(
+        self,
+        plain: tuple[Path, Path],
+        estimated: tuple[RotationResult, Path],
+        tmp_path: Path,
+    ) -> None:
+        warp(plain[1], tmp_path / "out.tif", estimated[1], reference=plain[0])
         reference, moved = (
             cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(float)
             for path in (plain[0], tmp_path / "out.tif")
@@ -99,7 +112,8 @@ class TestWithoutGeoreferencing:
         image = cv2.imread(str(plain[1]), cv2.IMREAD_UNCHANGED)
         noise = np.random.default_rng(0).integers(1, 60_000, image.shape).astype(np.uint16)
         two = write_raster(tmp_path / "two.tif", np.stack([noise, image]))
-        result = estimate_rotation(plain[0], two, input_band=2)
+        scales = {"smallest_scale": 1.0, "largest_scale": 1.3}
+        result = estimate_rotation(plain[0], two, input_band=2, **scales)
         assert result.pose.rotation_deg == pytest.approx(TRUTH.rotation_deg, abs=0.3)
 
 
@@ -156,7 +170,8 @@ class TestRefusal:
     def test_on_the_command_line(
         self, other_place: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     ) -> None:
-        assert main(["estimate-rotation", *map(str, other_place), "--json"]) == 3
+        near = ["--largest-rotation", "10", "--smallest-scale", "1", "--largest-scale", "1"]
+        assert main(["estimate-rotation", *map(str, other_place), *near, "--json"]) == 3
         told = capsys.readouterr()
         assert json.loads(told.out)["verdict"]["accepted"] is False
         assert len(told.err.splitlines()) == 1
@@ -185,7 +200,7 @@ class TestSearches:
     @pytest.mark.slow
     def test_what_a_search_cannot_find_is_refused(self, plain: tuple[Path, Path]) -> None:
         with pytest.raises(NotRegisteredError, match="prefers") as refusal:
-            estimate_rotation(*plain, "phase-correlation")
+            estimate_rotation(*plain, "phase-correlation", smallest_scale=1, largest_scale=1.3)
         assert refusal.value.verdict is not None
         assert refusal.value.verdict.rule == "other pose"
         assert str(refusal.value).endswith(refusal.value.verdict.advice)
@@ -219,7 +234,10 @@ class TestBadInput:
 
 @pytest.mark.slow
 def test_summary_and_lines_say_the_same(
-    plain: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    plain: tuple[Path, Path],
+    estimated: tuple[RotationResult, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     picture = tmp_path / "p.png"
     arguments = ["estimate-rotation", *map(str, plain), "--picture", str(picture)]
@@ -228,7 +246,7 @@ def test_summary_and_lines_say_the_same(
     for output in tool_of(estimate_rotation).outputs:
         assert output.value(told) is not None
     assert told["files"] == {"picture": str(picture)}
-    result = groundtie.estimate_rotation(*plain)
+    result, _ = estimated
     assert result.pose.rotation_deg == pytest.approx(told["rotation_deg"])
     text = "\n".join(result.lines())
     assert f"{told['rotation_deg']:+.2f}°" in text

@@ -27,6 +27,7 @@ from groundtie.masks import ground
 from groundtie.matching.shared_content import Sensors
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration import pipeline
+from groundtie.registration.registration import Registration
 from groundtie.registration.rules import scene as scene_rules
 from groundtie.registration.scene import ImageFacts, SceneInfo
 from groundtie.registration.specification import MATCHERS, OPTICAL
@@ -41,25 +42,37 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_textured_pair(folder, SIZE, shift_on_map(70.0, -45.0), noise=0.1)
 
 
-@pytest.mark.slow
-def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def registration(
+    files: TexturedPair, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Registration, Path]:
+    """Return the pair's registration, and the folder of all its files."""
+    folder = tmp_path_factory.mktemp("registered")
     found = match_optical(
         files.reference,
         files.input,
-        tmp_path / "out.tif",
-        tie_points=tmp_path / "points.gpkg",
-        transform=tmp_path / "transform.json",
-        report=tmp_path / "report.html",
+        folder / "out.tif",
+        tie_points=folder / "points.gpkg",
+        transform=folder / "transform.json",
+        report=folder / "report.html",
     )
+    return found, folder
+
+
+@pytest.mark.slow
+def test_a_pair_is_registered_with_all_its_files(
+    files: TexturedPair, registration: tuple[Registration, Path]
+) -> None:
+    found, folder = registration
     assert error_px(found.transform, files) < 0.3
-    assert error_px(load_transform(tmp_path / "transform.json"), files) < 0.3
-    report = json.loads((tmp_path / "report.json").read_text())
+    assert error_px(load_transform(folder / "transform.json"), files) < 0.3
+    report = json.loads((folder / "report.json").read_text())
     assert report["verdict"]["accepted"] is True
-    table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
+    table = read_tie_points(folder / "points.gpkg", found.transform.input_grid)
     assert len(table.reference_xy) == len(found.tie_points)
     reference, registered = (
         pixels(path)[0][40:-40, 40:-40].astype(float)
-        for path in (files.reference, tmp_path / "out.tif")
+        for path in (files.reference, folder / "out.tif")
     )
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] < -0.9
 
@@ -77,8 +90,10 @@ def test_every_matcher_finds_it_where_contrast_is_alike(
 
 
 @pytest.mark.slow
-def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
-    found = match_optical(files.reference, files.input, tmp_path / "out.tif")
+def test_check_points_lie_where_no_keypoint_was_seen(
+    files: TexturedPair, registration: tuple[Registration, Path]
+) -> None:
+    found, _ = registration
     fit, check = (
         files.grid.map_to_pixel(found.tie_points.reference_xy[found.tie_points.is_check == c])
         for c in (0, 1)

@@ -21,6 +21,7 @@ from groundtie.geometry.transform import load_transform
 from groundtie.masks.used import OPEN
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
 from groundtie.registration import pipeline
+from groundtie.registration.registration import Registration
 from groundtie.registration.rules import scene as scene_rules
 
 SIZE = (300, 280)
@@ -32,27 +33,39 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> TexturedPair:
     return write_speckled_pair(folder, SIZE, shift_on_map(70.0, -45.0))
 
 
-@pytest.mark.slow
-def test_a_pair_is_registered_with_all_its_files(files: TexturedPair, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def registration(
+    files: TexturedPair, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Registration, Path]:
+    """Return the pair's registration, and the folder of all its files."""
+    folder = tmp_path_factory.mktemp("registered")
     found = match_sar_sar(
         files.reference,
         files.input,
-        tmp_path / "out.tif",
-        tie_points=tmp_path / "points.gpkg",
-        transform=tmp_path / "transform.json",
-        report=tmp_path / "report.html",
+        folder / "out.tif",
+        tie_points=folder / "points.gpkg",
+        transform=folder / "transform.json",
+        report=folder / "report.html",
     )
+    return found, folder
+
+
+@pytest.mark.slow
+def test_a_pair_is_registered_with_all_its_files(
+    files: TexturedPair, registration: tuple[Registration, Path]
+) -> None:
+    found, folder = registration
     assert error_px(found.transform, files) < 0.4
-    assert error_px(load_transform(tmp_path / "transform.json"), files) < 0.4
+    assert error_px(load_transform(folder / "transform.json"), files) < 0.4
     assert found.verdict.accepted
-    report = json.loads((tmp_path / "report.json").read_text())
+    report = json.loads((folder / "report.json").read_text())
     assert report["verdict"]["accepted"] is True
-    assert "<html" in (tmp_path / "report.html").read_text().lower()
-    table = read_tie_points(tmp_path / "points.gpkg", found.transform.input_grid)
+    assert "<html" in (folder / "report.html").read_text().lower()
+    table = read_tie_points(folder / "points.gpkg", found.transform.input_grid)
     assert len(table.reference_xy) == len(found.tie_points)
     reference, registered = (
         np.log(pixels(path)[0][40:-40, 40:-40] + 1.0)
-        for path in (files.reference, tmp_path / "out.tif")
+        for path in (files.reference, folder / "out.tif")
     )
     assert np.corrcoef(reference.ravel(), registered.ravel())[0, 1] > 0.5
 
@@ -87,9 +100,10 @@ def test_keypoints_that_a_classifier_leaves_out_take_no_part(
 
 
 @pytest.mark.slow
-def test_check_points_lie_where_no_keypoint_was_seen(files: TexturedPair, tmp_path: Path) -> None:
-    found = match_sar_sar(files.reference, files.input, tmp_path / "out.tif")
-    points = found.tie_points
+def test_check_points_lie_where_no_keypoint_was_seen(
+    files: TexturedPair, registration: tuple[Registration, Path]
+) -> None:
+    points = registration[0].tie_points
     fit, check = (
         files.grid.map_to_pixel(points.reference_xy[points.is_check == c]) for c in (0, 1)
     )
