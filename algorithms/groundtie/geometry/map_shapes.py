@@ -7,13 +7,13 @@ domain, as a polygon of all oceans is on a UTM map.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
-from numpy.typing import NDArray
+import shapely.affinity
+import shapely.geometry
+import shapely.ops
 from rasterio.crs import CRS
 
 from ..rasters.grid import FloatArray, Grid, finite, full_turn, mesh, near_longitude, reproject
@@ -71,30 +71,39 @@ class MapShapes:
 
         Raises
         ------
-        ValueError
+        ValueError, ShapelyError
             The geometry is damaged.
         """
-        shape = shapely.geometry.shape(geometry)
-        turn = full_turn(self.crs)
-        parts = [
-            part
-            for by in ((0.0,) if turn is None else (-turn, 0.0, turn))
-            for part in self._cut(_moved(shape, by))
-        ]
-        if self.crs != self.grid.crs:
-            parts = shapely.transform(shapely.segmentize(parts, self.piece), self._reprojected)
-        return [shapely.geometry.mapping(part) for part in parts]
+        shape, turn = shapely.geometry.shape(geometry), full_turn(self.crs)
+        copies = [shape]
+        if turn is not None:
+            copies = [shapely.affinity.translate(shape, by) for by in (-turn, 0.0, turn)]
+        return [self._on_grids_map(part) for copy in copies for part in self._cut(copy)]
 
-    def _cut(self, shape: Any) -> Sequence[Any]:
+    def _cut(self, shape: Any) -> list[Any]:
         if shape.is_empty:
             return []
         left, lower, right, upper = shape.bounds
         box = self.box
-        if box[0] <= left and box[1] <= lower and right <= box[2] and upper <= box[3]:
-            return list(shapely.get_parts([shape]))
-        parts: NDArray[Any] = shapely.get_parts([shapely.clip_by_rect(shape, *box)])
-        # What a box touches only is a line or a point.
-        return list(parts[shapely.get_dimensions(parts) == shapely.get_dimensions(shape)])
+        if not (box[0] <= left and box[1] <= lower and right <= box[2] and upper <= box[3]):
+            shape = shapely.ops.clip_by_rect(shape, *box)
+        # What the box touches only is a line or a point.
+        kind = str(shape.geom_type).removeprefix("Multi")
+        return [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == kind]
+
+    def _on_grids_map(self, part: Any) -> dict[str, Any]:
+        if part.geom_type == "Polygon":
+            rings = [self._line(ring) for ring in (part.exterior, *part.interiors)]
+            return {"type": "Polygon", "coordinates": rings}
+        line = self._line(part)
+        is_point = part.geom_type == "Point"
+        return {"type": part.geom_type, "coordinates": line[0] if is_point else line}
+
+    def _line(self, of: Any) -> list[list[float]]:
+        xy = np.array(of.coords, float)[:, :2]
+        if self.crs != self.grid.crs:
+            xy = self._reprojected(_divided(xy, self.piece))
+        return list(xy.tolist())
 
     def _reprojected(self, xy: FloatArray) -> FloatArray:
         moved = reproject(xy, self.crs, self.grid.crs)
@@ -108,5 +117,11 @@ class MapShapes:
         return near_longitude(moved, centre, self.grid.crs)
 
 
-def _moved(shape: Any, by: float) -> Any:
-    return shapely.transform(shape, lambda xy: xy + [by, 0.0]) if by else shape
+def _divided(xy: FloatArray, longest: float) -> FloatArray:
+    """Return a line, (n, 2), with all edges divided into equal pieces no longer than a length."""
+    edges = np.diff(xy, axis=0)
+    counts = np.maximum(np.ceil(np.hypot(*edges.T) / longest), 1).astype(int)
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    share = (np.arange(counts.sum()) - firsts) / np.repeat(counts, counts)
+    pieces = np.repeat(xy[:-1], counts, axis=0) + share[:, None] * np.repeat(edges, counts, axis=0)
+    return np.concatenate([pieces, xy[-1:]])

@@ -81,7 +81,7 @@ class VectorLayer:
             for geometry in simple_geometries(feature["geometry"])
         ]
         if self.crs is not None and (self.crs != crs or full_turn(crs) is not None):
-            from shapely.errors import GEOSException  # slow to load
+            from shapely.errors import ShapelyError  # slow to load
 
             from .map_shapes import MapShapes
 
@@ -90,7 +90,7 @@ class VectorLayer:
                 raise VectorLayerError(f"the image has no place on the map of {self.path}")
             try:
                 located = [(feature, part) for feature, one in located for part in around.of(one)]
-            except (ValueError, TypeError, GEOSException) as error:
+            except (ValueError, TypeError, ShapelyError) as error:
                 raise VectorLayerError(f"a geometry of {self.path} is damaged: {error}") from error
         features = ({**feature, "geometry": geometry} for feature, geometry in located)
         return replace(self, crs=crs, features=tuple(features))
