@@ -59,6 +59,23 @@ def test_an_output_is_not_an_input_even_by_another_name(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.parametrize(
+    "name", ["GTIFF_DIR:1:{}", "vrt://{}?bands=1", "/vsisubfile/0_99,{}", "/vsicached?file={}"]
+)
+def test_an_output_is_not_the_file_behind_one_of_gdals_names(tmp_path: Path, name: str) -> None:
+    file, virtual = tmp_path / "a.tif", tmp_path / "a.vrt"
+    write_raster(file, np.zeros((4, 6)), utm_grid(6, 4))
+    rasterio.shutil.copy(file, virtual, driver="VRT")
+    for behind, owner in ((file, "input"), (virtual, "a source of input")):
+        given = ("input", RASTER, name.format(behind))
+        with pytest.raises(SameFileError, match=f"output is the same file as {owner}"):
+            check_paths([given, ("output", RASTER_OUT, file)])
+    source = "<SourceFilename>" + name.format(file) + "</SourceFilename>"
+    virtual.write_text(f"<VRTDataset><VRTRasterBand>{source}</VRTRasterBand></VRTDataset>")
+    with pytest.raises(SameFileError, match="output is the same file as a source of input"):
+        check_paths([("input", RASTER, virtual), ("output", RASTER_OUT, file)])
+
+
 @pytest.mark.parametrize("kind", [RASTER, MaskIn(**TEXTS), RastersIn(**TEXTS)])
 def test_an_output_is_nothing_that_a_virtual_input_is_made_of(tmp_path: Path, kind: Kind) -> None:
     write_raster(tmp_path / "a.tif", np.zeros((4, 6)), utm_grid(6, 4))

@@ -115,6 +115,9 @@ def test_the_name_of_a_file_is_its_last_part() -> None:
         'HDF5:"{0}"://group/band',
         "GTIFF_DIR:1:{0}",
         "/vsisubfile/0_10,{0}",
+        "/vsicached?chunk_size=10&file={0}",
+        "vrt://{0}?bands=1,1",
+        "DERIVED_SUBDATASET:LOGAMPLITUDE:{0}",
     ],
 )
 def test_the_file_behind_one_of_gdals_names_is_found(

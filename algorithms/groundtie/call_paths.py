@@ -20,7 +20,7 @@ from .kinds import (
     WrittenKind,
     shown_name,
 )
-from .raster_names import identity, rpc_files
+from .raster_names import identity, local_files, rpc_files
 from .strict_json import read_json
 from .vrt_sources import sources_of
 
@@ -56,8 +56,10 @@ def check_paths(values: Iterable[tuple[str, Kind, Any]]) -> None:
     for name, kind, value in values:
         for read in map(_identity, inputs_of(kind, value)):
             taken[read] = name
-            for source in sources_of(read) if isinstance(read, Path) else ():
-                taken.setdefault(source, f"a source of {name}")
+            for file in _files_of(read):
+                taken.setdefault(file, name)
+                for source in sources_of(file):
+                    taken.setdefault(source, f"a source of {name}")
         if isinstance(kind, WrittenKind) and value is not None:
             outputs.append((name, kind, value))
     made = {path.resolve() for _, kind, path in outputs if isinstance(kind, FolderOut)}
@@ -129,6 +131,13 @@ def _identity(raster: Any) -> Hashable:
         return identity(raster)
     # An open dataset is identified by its file.
     return getattr(raster, "identity", None) or Path(raster.name).resolve()
+
+
+def _files_of(read: Hashable) -> list[Path]:
+    """Return the files of a raster by its `_identity`; GDAL's names refer to some."""
+    if isinstance(read, str):
+        return [file.resolve() for file in local_files(read)]
+    return [read] if isinstance(read, Path) else []
 
 
 def _format(path: Path) -> Any:

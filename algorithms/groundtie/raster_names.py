@@ -25,6 +25,9 @@ _IN_ARCHIVE = re.compile(r"((?:/vsi(?:zip|tar|gzip|7z|rar)/)+)(.*)", re.S)
 # Separators between the parts of other names, as NETCDF:"a.nc":band; C:\\… is one part.
 _PARTS = re.compile(r"[\"{},]|(?<!\b[A-Za-z]):")
 
+# Separators of options, as /vsicached?chunk_size=1000&file=a.tif and vrt://a.tif?bands=1.
+_OPTIONS = re.compile(r"[?&=]")
+
 # pathlib makes one slash of two.
 _URL = re.compile(r"(/vsicurl/)?(https?|ftp|s3|gs|az|abfss?|oss|file):/{1,2}(?=[^/]|/[^/])", re.I)
 
@@ -174,8 +177,10 @@ def local_files(name: str, folder: Path | str = "") -> list[Path]:
     """
     if is_remote(name):
         return []
-    # Also the whole name: it may be a path although it looks like a driver's name.
-    paths = (in_archive(part)[1] for part in (name, *parts_of(name)))
+    # Also the whole name and the whole parts: they may be paths although they look like others.
+    parts = (name, *parts_of(name))
+    pieces = (*parts, *(piece for part in parts for piece in _OPTIONS.split(part)))
+    paths = (in_archive(piece.removeprefix("//"))[1] for piece in pieces)  # of vrt://a.tif
     places = (Path(os.path.abspath(os.path.join(folder, path))) for path in paths if path)
     found = (file_on_the_way_to(place) for place in places)
     return list(dict.fromkeys(file for file in found if file is not None))

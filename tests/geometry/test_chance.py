@@ -9,7 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from groundtie.geometry.chance import agreement_probability, log10_chance, log10_false_alarms
+from groundtie.geometry.chance import (
+    agreement_probability,
+    log10_chance,
+    log10_false_alarms,
+    log10_least_false_alarms,
+)
 
 
 def test_the_tolerance_circle_over_the_search_square() -> None:
@@ -48,6 +53,14 @@ def test_chance_far_below_the_smallest_number() -> None:
     )
     expected = math.log10(exact.numerator) - math.log10(exact.denominator)
     assert log10_chance(500, 600, 1 / 90) == pytest.approx(expected, rel=1e-9)
+
+
+def test_points_without_any_residual_are_as_unlikely_as_their_digits() -> None:
+    """Of 12 points, 3 fix the model and 9 agree within 1e-6 px: p = 1e-12 π / area, each."""
+    found = log10_least_false_alarms(np.zeros(12), 100.0**2, 3)
+    alone = log10_false_alarms(12, 12, np.pi * 1e-12 / 100.0**2, 3)
+    assert np.isfinite(found)
+    assert found == pytest.approx(alone + math.log10(9))
 
 
 @pytest.mark.slow

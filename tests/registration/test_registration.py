@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio.shutil
+from raster_files import write_raster
 from textured_pairs import TexturedPair, listing
 
 from groundtie.errors import (
@@ -112,6 +113,18 @@ def test_what_is_warped_beyond_the_overlap_is_stated(
     assert (beyond is not None) == (grid == "input")
     if beyond is not None:
         assert beyond.share == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_raster_without_its_georeferencing_is_warped_onto_the_inputs_grid(
+    registration: Registration, textured: TexturedPair, tmp_path: Path
+) -> None:
+    """Of the same size, it is taken for the input's pixels."""
+    with rasterio.open(textured.input) as dataset:
+        values = dataset.read()
+    bare = write_raster(tmp_path / "bare.tif", values)
+    own, found = (registration.warp(raster, grid="input") for raster in (None, bare))
+    assert (found.transform, found.crs) == (own.transform, own.crs)
+    np.testing.assert_array_equal(found.values, own.values)
 
 
 class TestWhatIsWrittenOverNothing:

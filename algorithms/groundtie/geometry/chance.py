@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp, xlog1py, xlogy
 
 from ..rasters.grid import FloatArray
+from ..rasters.lattice import ON_PIXELS
 
 
 def agreement_probability(tolerance_px: float, radius_px: int) -> float:
@@ -60,7 +61,8 @@ def log10_false_alarms(agreeing: int, total: int, probability: float, sample: in
 def log10_least_false_alarms(lengths_px: FloatArray, area_px2: float, sample: int) -> float:
     """Return `log10_false_alarms` at the tolerance radius that minimises it.
 
-    The number of radii tried is accounted for. Matches with a length of NaN agree at no radius.
+    The number of radii tried is accounted for. Matches with a length of NaN agree at no radius, and
+    no radius is smaller than the last digit of positions.
 
     Parameters
     ----------
@@ -71,7 +73,7 @@ def log10_least_false_alarms(lengths_px: FloatArray, area_px2: float, sample: in
     sample
         See `log10_false_alarms`.
     """
-    radii = np.nan_to_num(np.sort(lengths_px)[sample:], nan=np.inf)
+    radii = np.nan_to_num(np.sort(lengths_px)[sample:], nan=np.inf).clip(min=ON_PIXELS)
     probabilities = np.minimum(math.pi * radii**2 / area_px2, 1.0).tolist()
     alarms = [
         log10_false_alarms(agreeing, len(lengths_px), probability, sample)

@@ -91,7 +91,7 @@ class RegisteredOutput:
             else:
                 write_with_geotransform(source, moved, staged, progress=progress)
             return moved
-        to_px, target = resampled_onto(self.grid, source, reference, transform)
+        to_px, target = resampled_onto(self.grid, reference, transform)
         method, workers = self.resampling, context.workers
         if not warp_raster(
             source, to_px, target, staged, method, workers=workers, progress=progress
@@ -165,21 +165,20 @@ class BeyondOverlap:
         return f"{line}; warning: {self.model} bends, and may be off there by any amount"
 
 
-def resampled_onto(
-    grid: str, source: RasterSource, reference: Grid, transform: Transform
-) -> tuple[PointFunction, Grid]:
+def resampled_onto(grid: str, reference: Grid, transform: Transform) -> tuple[PointFunction, Grid]:
     """Return the function from a registered raster's map positions to pixels, and its grid.
 
     Parameters
     ----------
     grid
         "reference" or "input".
-    source, reference, transform
+    reference, transform
         As `RegisteredOutput.write` takes them.
     """
     if grid == REFERENCE_GRID:
         return transform.of_map(reference.crs), reference
-    own = source.grid
+    # The raster may lack the georeferencing that the transform's own image had.
+    own = transform.input_grid
     return transform.of_map(own.crs), registered_grid(
         own, lambda px: _registered_px(px, own, transform), own.crs
     )

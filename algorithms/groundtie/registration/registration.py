@@ -23,7 +23,7 @@ from ..kinds import GEOTIFF, Choice, FileOut, Number, RasterIn, RasterOut, Writt
 from ..masks.used import MaskUsed
 from ..matching.check import Check
 from ..matching.survey import Survey
-from ..raster_names import file_name
+from ..raster_names import file_name, is_gdal_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair
@@ -222,7 +222,7 @@ class Registration:
                     made = RegisteredOutput(path, grid, resampling)
                     made.write(source, reference, transform, outputs, context)
                 return None
-            to_px, target = resampled_onto(grid, source, reference, transform)
+            to_px, target = resampled_onto(grid, reference, transform)
             return warp_to_array(source, to_px, target, resampling, workers=context.workers)
 
     def beyond_overlap(self, grid: str, transform: Transform | None = None) -> BeyondOverlap | None:
@@ -271,9 +271,10 @@ class Registration:
         These are the warped raster, the images, and all other inputs among the parameters.
         """
         read: dict[str, Any] = {
-            parameter: self.folder / value
+            parameter: self.folder / value if isinstance(value, Path) else value
             for parameter, value in self.parameters.items()
-            if isinstance(value, Path) and value not in self.files.values()
+            if (isinstance(value, Path) or (isinstance(value, str) and is_gdal_name(value)))
+            and value not in self.files.values()
         }
         read |= {"reference": self.pair.reference.source, "input": self.pair.input.source}
         read |= {} if warped is None else {"raster": warped}
