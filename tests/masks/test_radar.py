@@ -16,7 +16,7 @@ from groundtie.masks.radar import (
 )
 from groundtie.rasters.pair import Image
 from groundtie.rasters.patch import Patch
-from groundtie.rasters.reading import open_raster
+from groundtie.rasters.reading import Window, open_raster
 
 
 def variation2(path: Path, values: np.ndarray) -> float:
@@ -37,6 +37,32 @@ def test_speckle_varies_more_than_the_grain_of_a_camera(tmp_path: Path, looks: i
     assert (radar >= LEAST_VARIATION2) == (looks < 20)
     # Most homogeneous windows are so by chance, too.
     assert 0.3 < radar * looks < 1.2
+
+
+@pytest.mark.parametrize("place", [(0, 0), (1800, 1800), (900, 100)])
+def test_a_radar_image_in_a_corner_of_its_file_is_one(
+    tmp_path: Path, place: tuple[int, int]
+) -> None:
+    """The middle of the file holds no data."""
+    speckle = 50 * np.sqrt(np.random.default_rng(2).gamma(4, 1 / 4, (700, 700)))
+    alone = variation2(tmp_path / "alone.tif", speckle)
+    canvas = np.zeros((2500, 2500), np.float32)
+    canvas[place[1] : place[1] + 700, place[0] : place[0] + 700] = speckle
+    with open_raster(write_raster(tmp_path / "a.tif", canvas, nodata=0)) as source:
+        found = variation2_of(Image(source))
+    assert alone > LEAST_VARIATION2
+    assert found == pytest.approx(alone, rel=0.1)
+
+
+def test_what_counts_is_the_part_that_is_asked_for(tmp_path: Path) -> None:
+    """A mosaic of a radar and a camera image."""
+    random = np.random.default_rng(3)
+    values = 50 + random.normal(0, 1, (2200, 2200))
+    values[:1100, :1100] = 50 * np.sqrt(random.gamma(1, 1, (1100, 1100)))
+    with open_raster(write_raster(tmp_path / "a.tif", values.astype(np.float32))) as source:
+        image = Image(source)
+        assert variation2_of(image, Window(0, 0, 1100, 1100)) > LEAST_VARIATION2
+        assert variation2_of(image, Window(1100, 1100, 1100, 1100)) < LEAST_VARIATION2
 
 
 @pytest.mark.parametrize(("unit", "name"), [("dB", None), (None, "Sigma0_VV_db"), (None, None)])

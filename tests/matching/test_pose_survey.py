@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from raster_files import write_raster
+from affine import Affine
+from raster_files import UTM, write_raster
 from turned_pairs import turned_pair
 
 from groundtie.context import Context
-from groundtie.matching.pose_survey import PoseSurvey, survey_pose
+from groundtie.matching.pose_survey import PoseSurvey, _moved, survey_pose
 from groundtie.matching.shared_content import ImageKinds, Sensors
 from groundtie.pose.pose import Pose
 from groundtie.pose.rotation_windows import read_windows
+from groundtie.rasters.grid import Grid, mesh
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 
@@ -82,3 +84,22 @@ def test_a_strip_that_moved_is_found_by_smaller_chips(tmp_path: Path, context: C
 def test_images_that_hardly_overlap_confirm_nothing(tmp_path: Path, context: Context) -> None:
     found = surveyed(tmp_path, replace(TRUTH, shift_px=(170.0, 150.0)), context)
     assert found.agrees.mean() < 0.25
+
+
+@pytest.mark.parametrize("height_m", [1.0, 2.0, 0.5])
+def test_a_pose_is_refined_on_the_ground_by_pixels_of_any_shape(height_m: float) -> None:
+    """Surfaces have their peaks where a rotation by 1° on the ground puts the chips."""
+    grid = Grid(Affine(1, 0, 500_000, 0, -height_m, 5_000_000), UTM, 500, 500)
+    px = mesh(np.arange(50, 500, 100), np.arange(50, 500, 100)).astype(int)
+    turn, sides = np.deg2rad(1.0), np.array([1.0, height_m])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    moved = 250 + ((px - 250) * sides @ rotation.T) / sides
+    offset = np.arange(-20, 21)
+    surfaces = np.array(
+        [np.exp(-((offset[:, None] - y) ** 2 + (offset - x) ** 2) / 8) for x, y in moved - px],
+        np.float32,
+    )
+    found = _moved(px, surfaces, grid)
+    np.testing.assert_allclose(found.model(px), moved, atol=0.05)
+    for model in found.fold_models:
+        np.testing.assert_allclose(model(px), moved, atol=0.1)

@@ -249,9 +249,9 @@ def test_facts_are_found_when_asked_for_and_never_again(
     for name in ("variation2_of", "share_of_strong_scatterers", "is_known_radar"):
         found = getattr(scene_module, name)
 
-        def counted(of: object, name: str = name, found: object = found) -> object:
+        def counted(*of: object, name: str = name, found: object = found) -> object:
             asked.append(name)
-            return found(of)  # type: ignore[operator]
+            return found(*of)  # type: ignore[operator]
 
         monkeypatch.setattr(scene_module, name, counted)
     with opened(tmp_path, speckled(0.25), FIELDS) as pair:

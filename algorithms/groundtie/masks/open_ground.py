@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rasters.grid import Grid
-from ..rasters.patch import Patch, distance_to_masked, middle_window
+from ..rasters.patch import Patch, distance_to_masked, sample_of
 from ..rasters.reading import Mask, Window
 from ..speckle.statistics import (
     HOMOGENEOUS_EXCESS,
@@ -54,8 +54,8 @@ class OpenGround:
 
     @classmethod
     def of(cls, scene: Scene) -> OpenGround:
-        """Return the open ground of a scene; its looks are estimated in the middle."""
-        patch = scene.read(middle_window(scene.grid, SAMPLE_PX))
+        """Return the open ground of a scene; its looks are estimated from a sample."""
+        patch = sample_of(scene.read, scene.grid, SAMPLE_PX)
         return cls(scene, estimate_looks(power(patch), patch.valid))
 
     def select(self, window: Window) -> Selection:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..rasters.pair import Image
-from ..rasters.patch import Patch, has_negative, middle_window
-from ..rasters.reading import FloatImage
+from ..rasters.patch import Patch, has_negative, sample_of
+from ..rasters.reading import FloatImage, Window
 from ..speckle.statistics import homogeneous_variation2
 
-# Side of the sample in the middle of an image, at full resolution: averaging would remove speckle.
+# Side of the sample of an image, at full resolution: averaging would remove speckle.
 SAMPLE_PX = 1024
 
 # Least squared coefficient of variation of the power in the most homogeneous windows of a radar
@@ -27,25 +27,27 @@ _LEAST_DB, _MOST_DB, _LEAST_RANGE_DB = -60.0, 40.0, 10.0
 _MOST_STATED_DB = 100.0
 
 
-def variation2_of(image: Image) -> float:
+def variation2_of(image: Image, part: Window | None = None) -> float:
     """Return the squared coefficient of variation in an image's most homogeneous windows.
 
-    Grey values are assumed to be amplitudes, or decibels.
+    Grey values are assumed to be amplitudes, or decibels; `part` is asked for, by default the whole
+    image.
     """
-    patch = _sample(image)
+    patch = _sample(image, part)
     amplitude = to_amplitude(patch) if _holds_decibels(image, patch) else patch
     return homogeneous_variation2(power(amplitude), patch.valid)
 
 
-def is_in_decibels(image: Image) -> bool:
+def is_in_decibels(image: Image, part: Window | None = None) -> bool:
     """Whether an image has decibels: by a band's unit or name, else by its values.
 
     Many values of backscatter are negative, and none is beyond a range. Other images with as many
     negative values, such as indices and standardised ones, have a larger or a much smaller range.
-    Decibels that are all positive cannot be told from grey values.
+    Decibels that are all positive cannot be told from grey values. `part` is asked for, by default
+    the whole image.
     """
     may_be = image.source.dtype.kind != "u" or _states_decibels(image)
-    return may_be and _holds_decibels(image, _sample(image))
+    return may_be and _holds_decibels(image, _sample(image, part))
 
 
 def to_amplitude(patch: Patch) -> Patch:
@@ -58,9 +60,13 @@ def power(patch: Patch) -> FloatImage:
     return np.where(patch.valid, patch.values * patch.values, np.float32(0))
 
 
-def _sample(image: Image) -> Patch:
-    middle = middle_window(image.source.grid, SAMPLE_PX)
-    return Patch(*image.source.read(middle, image.band))
+def _sample(image: Image, part: Window | None) -> Patch:
+    source = image.source
+
+    def read(window: Window) -> Patch:
+        return Patch(*source.read(window, image.band))
+
+    return sample_of(read, source.grid, SAMPLE_PX, part)
 
 
 def _states_decibels(image: Image) -> bool:

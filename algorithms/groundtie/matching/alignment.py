@@ -117,7 +117,7 @@ class _Field(Rows):
 
 def align(
     kinds: Sequence[str],
-    px: NDArray[np.int_],
+    px: NDArray[np.int_] | FloatArray,
     surfaces: Surfaces,
     prior: Prior,
     start: PointFunction,
@@ -179,7 +179,7 @@ def _align(
     return Fitted(family.model(parameters), models), scores
 
 
-def _fields(px: NDArray[np.int_], surfaces: Surfaces, prior: Prior) -> list[_Field]:
+def _fields(px: NDArray[np.int_] | FloatArray, surfaces: Surfaces, prior: Prior) -> list[_Field]:
     """Return the interpolated surfaces, from the most to the least blurred."""
     fields, centres = [], px.astype(float)
     predicted = prior.to_nominal(centres)

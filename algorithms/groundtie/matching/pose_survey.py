@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 from ..context import Context
@@ -21,7 +22,7 @@ from ..rasters.grid import FloatArray, Grid, finite
 from ..rasters.pair import ImagePair
 from ..similarity.peak import peak_shifts
 from ..similarity.surface import SimilaritySettings
-from .alignment import IDENTITY, align
+from .alignment import Prior, align
 from .belief_propagation import Surfaces
 from .chips import ChipMatcher
 from .coarse_shift import level_factor
@@ -109,11 +110,11 @@ def survey_pose(
     quiet = context.quiet()
     images = matcher.resampled(transform.model, level, SURVEY_RADIUS_PX, quiet)
     kept, surfaces = matcher.match_forward(images, places, SURVEY_RADIUS_PX, quiet)
-    residuals = _cross_fitted_px(kept, surfaces, places.chip_px)
+    residuals = _cross_fitted_px(kept, surfaces, places)
     model = transform.model
     fold_models: tuple[Model, ...] = ()
     if len(kept) >= _FEWEST:
-        aligned = _moved(kept, surfaces)
+        aligned = _moved(kept, surfaces, level)
         model, fold_models = compose(model, aligned.model, level), aligned.fold_models
     elsewhere_px = max(accuracy_share * max(level.size), POSE_TOLERANCE_PX)
     moved = Transform(model, transform.crs, transform.input_grid)
@@ -147,21 +148,29 @@ def _places(grid: Grid) -> Places:
     return Places.spread(level, chip, lambda side: side // chip)
 
 
-def _moved(px: NDArray[np.int_], surfaces: Surfaces) -> Fitted:
-    """Return the similarity transform of grid pixels on which the chips' surfaces agree."""
+def _moved(px: NDArray[np.int_], surfaces: Surfaces, grid: Grid) -> Fitted:
+    """Return the similarity transform on the ground on which the chips' surfaces agree.
+
+    It is between pixels of the grid, which need not be square on the ground.
+    """
     # Every chip counts the same; only chips without content are lower than 1.
     equal = surfaces / np.maximum(surfaces.max(axis=(1, 2), keepdims=True), 1)
-    return align(["similarity"], px, equal, IDENTITY, np.copy)
+    sides = np.divide(grid.pixel_sides_m, min(grid.pixel_sides_m))
+    # Positions in the shorter side, and shifts of the surfaces in pixels.
+    prior = Prior(np.copy, np.diag(sides))
+    found = align(["similarity"], px * sides, equal, prior, np.copy)
+    to_px = Affine.scale(*(1 / sides))
+    return Fitted(found.model.on_map(to_px), tuple(one.on_map(to_px) for one in found.fold_models))
 
 
-def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, pitch_px: int) -> FloatArray:
+def _cross_fitted_px(px: NDArray[np.int_], surfaces: Surfaces, places: Places) -> FloatArray:
     """Return the residuals of chips from a model fitted to the chessboard's other colour."""
-    is_black = (px // pitch_px).sum(axis=1) % 2 == 0
+    is_black = (px // places.chip_px).sum(axis=1) % 2 == 0
     residuals = np.full((len(px), 2), np.inf)
     if min(is_black.sum(), (~is_black).sum()) < _FEWEST:
         return residuals
     found = px + peak_shifts(surfaces)
     for which in (is_black, ~is_black):
-        model = _moved(px[~which], surfaces[~which]).model
+        model = _moved(px[~which], surfaces[~which], places.grid).model
         residuals[which] = found[which] - model(px[which].astype(float))
     return residuals

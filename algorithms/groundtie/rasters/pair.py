@@ -390,11 +390,17 @@ def part_below(grid: Grid, other: Grid) -> Grid:
 
     The scale of a map of the world is another one at the map's centre.
     """
-    if grid.crs is None or other.crs is None:
-        return grid
-    outline = other.to_pixels_of(grid)(other.pixel_to_map(other.outline()))
-    box = _box(grid, outline, 0.0) if len(finite(outline)) else None
-    return grid if box is None else grid.window(*box)
+    window = window_below(grid, other)
+    return grid if window[2:] == grid.size else grid.window(*window)
+
+
+def window_below(grid: Grid, other: Grid) -> Window:
+    """Return the pixels of a grid that another one nominally covers; all if none are known."""
+    box = None
+    if (grid.crs is None) == (other.crs is None):
+        outline = other.to_pixels_of(grid)(other.pixel_to_map(other.outline()))
+        box = _box(grid, outline, 0.0) if len(finite(outline)) else None
+    return Window(0, 0, *grid.size) if box is None else box
 
 
 def _box(grid: Grid, outline_px: FloatArray, margin_px: float) -> Window | None:

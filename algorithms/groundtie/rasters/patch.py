@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .grid import Grid
+from .grid import Grid, mesh
 from .kernels import REACH
 from .windows import FloatImage, Mask, Window
 
@@ -19,6 +19,10 @@ _EMPTY_PX = 9
 
 # Interpolating or averaging a constant changes it by a few units in the last place.
 _ROUNDING = 8 * float(np.finfo(np.float32).eps)
+
+# Least valid share of a sample, and the places along each side of an image where one is looked for:
+# 25 pieces of 1024 px are read in half a second.
+_SAMPLE_SHARE, _SAMPLES_ALONG = 0.5, 5
 
 # A larger share of negative values is not due to resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
@@ -123,6 +127,47 @@ def distance_to_masked(valid: Mask) -> FloatImage:
 def has_negative(known: FloatImage) -> bool:
     """Return whether so many valid grey values, of any shape, are negative as in decibels."""
     return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
+
+
+def sample_of(
+    read: Callable[[Window], Patch], grid: Grid, side_px: int, part: Window | None = None
+) -> Patch:
+    """Return a piece of an image that is mostly valid, from the middle of a part if that is.
+
+    Parameters
+    ----------
+    read
+        Reads windows of the image.
+    grid
+        The image's pixels.
+    side_px
+        Longest side of the piece.
+    part
+        The part of the image whose content is asked for; None: all of it.
+    """
+    fullest = None
+    for window in _sample_windows(grid, side_px, part or Window(0, 0, *grid.size)):
+        patch = read(window)
+        if patch.valid_share >= _SAMPLE_SHARE:
+            return patch
+        if fullest is None or patch.valid.sum() > fullest.valid.sum():
+            fullest = patch
+    assert fullest is not None
+    return fullest
+
+
+def _sample_windows(grid: Grid, side_px: int, part: Window) -> list[Window]:
+    """Return windows all over a part of a grid, those in its middle first."""
+    firsts, sides = [], [min(side, side_px) for side in grid.size]
+    for start, length, side, whole in zip(part[:2], part[2:], sides, grid.size, strict=True):
+        free = max(length - side, 0)
+        low = start + (length - side - free) / 2
+        along = low + free * np.linspace(0, 1, _SAMPLES_ALONG)
+        firsts.append(np.clip(along, 0, whole - side).astype(int))
+    middle = [first[_SAMPLES_ALONG // 2] for first in firsts]
+    places = mesh(*firsts)
+    order = np.argsort(((places - middle) ** 2).sum(axis=1), kind="stable")
+    return list(dict.fromkeys(Window(*place, *sides) for place in places[order].tolist()))
 
 
 def middle_window(grid: Grid, side_px: int = 2048) -> Window:

@@ -29,7 +29,7 @@ from ..matching.band_shifts import BandShift, band_shifts
 from ..matching.matcher import MaskOf
 from ..matching.shared_content import ImageKinds, Sensors
 from ..rasters.grid import Grid, PointFunction
-from ..rasters.pair import Image, ImagePair, part_below
+from ..rasters.pair import Image, ImagePair, part_below, window_below
 from ..rasters.patch import Patch
 from ..rasters.radar_tags import is_known_radar
 from ..rasters.reading import Mask, Window
@@ -63,7 +63,7 @@ class ImageFacts:
     @cached_property
     def variation2(self) -> float:
         """Squared coefficient of variation of the power in its most homogeneous windows."""
-        return variation2_of(self.image)
+        return variation2_of(self.image, window_below(self.image.source.grid, self.scene.grid))
 
     @cached_property
     def strong_share(self) -> float:
@@ -345,7 +345,8 @@ def scene_of(pair: ImagePair, name: str) -> Scene:
 def _facts_of(pair: ImagePair, name: str) -> ImageFacts:
     """Return the facts about an image; they are found in amplitudes, also those of decibels."""
     image, scene = located(pair, name)[0], scene_of(pair, name)
-    in_decibels = cache(lambda: is_in_decibels(image))
+    part = window_below(image.source.grid, scene.grid)
+    in_decibels = cache(lambda: is_in_decibels(image, part))
 
     def read(at: Window) -> Patch:
         return to_amplitude(scene.read(at)) if in_decibels() else scene.read(at)
