@@ -17,7 +17,12 @@ def points_name() -> str:
 
 def file_name(layer: Any) -> str:
     """Return a raster layer's source without the options that QGIS appends."""
-    return re.sub(r"\|(option|credential):[^|]*| authcfg='[^']+'", "", layer.source())
+    return without_options(layer.source())
+
+
+def without_options(source: str) -> str:
+    """Return a source of GDAL without the options that QGIS appends."""
+    return re.sub(r"\|(option|credential):[^|]*| authcfg='[^']+'", "", source)
 
 
 def has_rpcs(layer: Any) -> bool:

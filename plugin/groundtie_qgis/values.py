@@ -12,13 +12,14 @@ from qgis.core import (
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingUtils,
+    QgsRasterLayer,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
 
 from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
-from .start_files import file_name
+from .start_files import file_name, without_options
 from .translation import tr
 
 
@@ -60,7 +61,7 @@ class Reader:
         if isinstance(kind, kinds.RasterIn):
             return self._raster(kind, name, given)
         if isinstance(kind, kinds.RastersIn):
-            return self._rasters(kind, name, given)
+            return self._rasters(kind, given)
         if isinstance(kind, kinds.VectorIn):
             return self._vector(name, given)
         if isinstance(kind, kinds.MaskIn):
@@ -100,12 +101,18 @@ class Reader:
             return given  # the library's error message is better than QGIS's
         return _file_of(layer, kind)
 
-    def _rasters(self, kind: Any, name: str, given: Any) -> Any:
-        layers = self._algorithm.parameterAsLayerList(self._parameters, name, self._context)
-        names = [given] if isinstance(given, str) else list(given)
-        if len(layers) < len(names):
-            return names  # folders, patterns and tables are not layers
-        return [_file_of(layer, kind) for layer in layers]
+    def _rasters(self, kind: Any, given: Any) -> list[str]:
+        several = given if isinstance(given, (list, tuple)) else [given]
+        return [self._raster_or_name(kind, one) for one in several]
+
+    def _raster_or_name(self, kind: Any, given: Any) -> str:
+        """Return the file of a raster layer; folders, patterns and tables are not layers."""
+        layer = given
+        if isinstance(given, str):
+            layer = QgsProcessingUtils.mapLayerFromString(given, self._context, False)
+            if not isinstance(layer, QgsRasterLayer):
+                return without_options(given)
+        return _file_of(layer, kind)
 
     def _mask(self, kind: Any, name: str, given: Any) -> Any:
         if isinstance(given, str) and Path(given).is_file():

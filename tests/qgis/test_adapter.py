@@ -190,6 +190,33 @@ class TestRun:
         else:
             assert seen["mask"] == files[kind]
 
+    def test_several_rasters_may_be_layers_folders_patterns_and_tables(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        from qgis.core import QgsProject, QgsRasterLayer
+
+        (tmp_path / "dates.csv").write_text("file,time\na.tif,2020-01-01\n")
+        (tmp_path / "item.json").write_text('{"type": "Feature", "assets": {}}')
+        (tmp_path / "folder").mkdir()
+        others = ["dates.csv", "item.json", "folder", "*.tif"]
+        names = [str(tmp_path / name) for name in others]
+        layer = QgsRasterLayer(values["INPUT"], "layer")
+        QgsProject.instance().addMapLayer(layer)
+        for given in (*names, *([name] for name in names), [layer.id(), *names]):
+            assert check(algorithm, {**values, "OTHERS": given}) == (True, "")
+        no_file = "Incorrect parameter value for OTHERS"
+        for given in ("none*.tif", [""], [*names, str(tmp_path / "none.tif")]):
+            assert check(algorithm, {**values, "OTHERS": given}) == (False, no_file)
+        seen = called_with(algorithm, {**values, "OTHERS": [layer, *names]}, monkeypatch)
+        assert seen["others"] == (Path(values["INPUT"]), *map(Path, names))
+        table = called_with(algorithm, {**values, "OTHERS": names[0]}, monkeypatch)
+        assert table["others"] == (Path(names[0]),)
+        QgsProject.instance().clear()
+
     def test_names_of_gdal_stay_as_they_are(
         self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
