@@ -63,7 +63,7 @@ class Reader:
         if isinstance(kind, kinds.RastersIn):
             return self._rasters(kind, given)
         if isinstance(kind, kinds.VectorIn):
-            return self._vector(name, given)
+            return self._vector(kind, name, given)
         if isinstance(kind, kinds.MaskIn):
             return self._mask(kind, name, given)
         if isinstance(kind, kinds.Choice):
@@ -119,10 +119,13 @@ class Reader:
             return given  # a classifier is not a layer, but GDAL may take it for one
         layer = self._algorithm.parameterAsLayer(self._parameters, name, self._context)
         if isinstance(layer, QgsVectorLayer):
-            return self._vector(name, given)
+            return self._vector(kind, name, given)
         return self._raster(kind, name, given)
 
-    def _vector(self, name: str, given: Any) -> Any:
+    def _vector(self, kind: Any, name: str, given: Any) -> Any:
+        layer = self._algorithm.parameterAsVectorLayer(self._parameters, name, self._context)
+        if layer is not None and layer.isModified():  # its file lacks what is not saved yet
+            return _snapshot(layer, tr(kind.label), self._context)
         path = self._algorithm.parameterAsCompatibleSourceLayerPath(
             self._parameters, name, self._context, ["gpkg", "geojson"], "gpkg", self._feedback
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -189,6 +190,32 @@ class TestRun:
             assert seen["mask"].suffix == ".gpkg"
         else:
             assert seen["mask"] == files[kind]
+
+    @pytest.mark.parametrize("name", ["MASK", "REGIONS"])
+    def test_unsaved_edits_of_shapes_count(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        name: str,
+    ) -> None:
+        from qgis.core import QgsVectorLayer
+
+        path = tmp_path / "m.geojson"
+        shapes = [
+            {"type": "Polygon", "coordinates": [[[x, 0], [x + 1, 0], [x, 1]]]} for x in (3, 8)
+        ]
+        features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+        layer = QgsVectorLayer(str(path), "mask")
+        layer.startEditing()
+        layer.deleteFeature(next(layer.getFeatures()).id())
+        seen = called_with(algorithm, {**values, name: layer}, monkeypatch)[name.lower()]
+        (left,) = QgsVectorLayer(str(seen), "seen").getFeatures()
+        assert left.geometry().boundingBox().xMinimum() == 8
+        layer.rollBack()
+        assert called_with(algorithm, {**values, name: layer}, monkeypatch)[name.lower()] == path
 
     def test_several_rasters_may_be_layers_folders_patterns_and_tables(
         self,
