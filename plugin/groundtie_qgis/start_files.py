@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+from qgis.core import QgsCoordinateReferenceSystem
+
 from .dependencies import missing_for
 
 
@@ -27,14 +29,31 @@ def without_options(source: str) -> str:
 
 def has_rpcs(layer: Any) -> bool:
     """Whether a raster layer is located only by RPCs, with which GDAL warps it for QGIS."""
-    from osgeo import gdal
-
     if layer is None or layer.providerType() != "gdal":
         return False
-    try:
-        dataset = gdal.Open(file_name(layer))
-    except RuntimeError:  # Another plugin may have enabled GDAL exceptions; the file is gone.
-        return False
+    dataset = _opened(layer)
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
         return False
     return bool(dataset.GetMetadata("RPC"))
+
+
+def crs_of_file(layer: Any) -> QgsCoordinateReferenceSystem:
+    """Return the CRS that the file of a raster layer has now.
+
+    It is the layer's where that is nothing to the file's georeferencing: none, or RPCs or GCPs.
+    """
+    # The layer's provider keeps the CRS of when it was loaded.
+    dataset = None if layer.crs() == layer.dataProvider().crs() else _opened(layer)
+    if dataset is None or dataset.GetGeoTransform(can_return_null=True) is None:
+        return layer.crs()
+    return QgsCoordinateReferenceSystem.fromWkt(dataset.GetProjection())
+
+
+def _opened(layer: Any) -> Any:
+    """Return GDAL's dataset of a raster layer; None if its file is gone."""
+    from osgeo import gdal
+
+    try:
+        return gdal.Open(file_name(layer))
+    except RuntimeError:  # Another plugin may have enabled GDAL exceptions.
+        return None

@@ -8,6 +8,7 @@ from typing import Any
 
 from qgis.core import (
     NULL,
+    QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
@@ -19,7 +20,7 @@ from qgis.core import (
 
 from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
-from .start_files import file_name, without_options
+from .start_files import crs_of_file, file_name, without_options
 from .translation import tr
 
 
@@ -52,7 +53,7 @@ class Reader:
         Raises
         ------
         ParameterError
-            A layer is not based on a file.
+            A layer is not based on a file, or has another CRS than its file.
         """
         name, kind = qgis_name(parameter.name), parameter.kind
         given = self._parameters.get(name)
@@ -180,11 +181,27 @@ def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) 
 
 
 def _file_of(layer: Any, kind: Any) -> str:
-    """Return the file of a raster layer; raise `ParameterError` if it has none."""
+    """Return the file of a raster layer; `ParameterError` if it has none, or another CRS."""
     provider = layer.providerType()
     if provider != "gdal":
         raise errors.ParameterError(
             f"{tr(kind.label)} must be a raster file, not the layer {layer.name()} of the "
             f"provider {provider}; export it to a file first"
         )
+    _require_crs_of_file(layer, tr(kind.label))
     return file_name(layer)
+
+
+def _require_crs_of_file(layer: Any, label: str) -> None:
+    given, own = layer.crs(), crs_of_file(layer)
+    # One CRS may be written with and without its EPSG code.
+    if given.isValid() and given != own and given.toProj() != own.toProj():
+        raise errors.ParameterError(
+            f"{label}: the layer {layer.name()} has the CRS {_named(given)}, but its file, which "
+            f"is read, has {_named(own)}; assign the right one to the file (Raster > Projections > "
+            "Assign Projection) and to the layer"
+        )
+
+
+def _named(crs: QgsCoordinateReferenceSystem) -> str:
+    return crs.authid() or crs.description() or "none"

@@ -13,8 +13,8 @@ import rasterio
 from rasterio.transform import from_origin
 
 
-def write_raster(path: Path, bands: int = 1) -> Path:
-    grid = {"transform": from_origin(500000, 5000000, 1, 1), "crs": "EPSG:32633"}
+def write_raster(path: Path, bands: int = 1, **other: Any) -> Path:
+    grid = {"transform": from_origin(500000, 5000000, 1, 1), "crs": "EPSG:32633", **other}
     with rasterio.open(path, "w", "GTiff", 20, 20, bands, dtype="uint8", **grid) as raster:
         raster.write(np.ones((bands, 20, 20), np.uint8))
     return path
@@ -414,6 +414,43 @@ class TestCheck:
             "Reference must be a raster file, not the layer Map of the provider wms; "
             "export it to a file first"
         )
+
+    @pytest.mark.parametrize("name", ["REFERENCE", "OTHERS", "MASK"])
+    def test_a_crs_that_only_the_layer_has_is_refused(
+        self, algorithm: Any, values: dict[str, Any], tmp_path: Path, name: str
+    ) -> None:
+        """The tool reads the file; until that has the CRS, its pixels are of unknown size."""
+        from qgis.core import QgsCoordinateReferenceSystem, QgsProject, QgsRasterLayer
+
+        path = write_raster(tmp_path / "m.tif", crs=None)
+        layer = QgsRasterLayer(str(path), "Map")
+        QgsProject.instance().addMapLayer(layer)
+        given = {**values, name: layer.id()}
+        assert check(algorithm, given) == (True, "")
+        layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32633"))
+        assert check(algorithm, given) == (
+            False,
+            f"{name.capitalize()}: the layer Map has the CRS EPSG:32633, but its file, which is "
+            "read, has none; assign the right one to the file (Raster > Projections > Assign "
+            "Projection) and to the layer",
+        )
+        with rasterio.open(path, "r+") as raster:
+            raster.crs = "EPSG:32633"
+        assert check(algorithm, given) == (True, "")
+        QgsProject.instance().clear()
+
+    def test_a_crs_of_a_layer_without_georeferencing_says_nothing(
+        self, algorithm: Any, values: dict[str, Any], tmp_path: Path
+    ) -> None:
+        """QGIS can be set to give the project's CRS to every layer that has none."""
+        from qgis.core import QgsCoordinateReferenceSystem, QgsProject, QgsRasterLayer
+
+        path = write_raster(tmp_path / "m.tif", crs=None, transform=None)
+        layer = QgsRasterLayer(str(path), "Map")
+        layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32633"))
+        QgsProject.instance().addMapLayer(layer)
+        assert check(algorithm, {**values, "REFERENCE": layer.id()}) == (True, "")
+        QgsProject.instance().clear()
 
     def test_a_check_has_no_layer_loaded(self, algorithm: Any, values: dict[str, Any]) -> None:
         from qgis.core import (
