@@ -1,4 +1,4 @@
-"""File names of layers and of the dock's outputs, and detection of images with RPCs."""
+"""Files of layers and of the dock's outputs: names, CRSs, and whether RPCs locate them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def has_rpcs(layer: Any) -> bool:
     """Whether a raster layer is located only by RPCs, with which GDAL warps it for QGIS."""
     if layer is None or layer.providerType() != "gdal":
         return False
-    dataset = _opened(layer)
+    dataset = opened(layer)
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:
         return False
     return bool(dataset.GetMetadata("RPC"))
@@ -43,13 +43,13 @@ def crs_of_file(layer: Any) -> QgsCoordinateReferenceSystem:
     It is the layer's where that is nothing to the file's georeferencing: none, or RPCs or GCPs.
     """
     # The layer's provider keeps the CRS of when it was loaded.
-    dataset = None if layer.crs() == layer.dataProvider().crs() else _opened(layer)
+    dataset = None if layer.crs() == layer.dataProvider().crs() else opened(layer)
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is None:
         return layer.crs()
     return QgsCoordinateReferenceSystem.fromWkt(dataset.GetProjection())
 
 
-def _opened(layer: Any) -> Any:
+def opened(layer: Any) -> Any:
     """Return GDAL's dataset of a raster layer; None if its file is gone."""
     from osgeo import gdal
 
