@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import glob
 import math
+import os
 from collections.abc import Callable, Sequence
 from functools import singledispatch
 from pathlib import Path
@@ -90,12 +92,32 @@ def _raster_in(kind: Any, parameter: Any) -> Made:
     return QgsProcessingParameterRasterLayer, _optional(parameter)
 
 
+class LayersOrNames(QgsProcessingParameterMultipleLayers):
+    """Layers, or files, folders and patterns, even if they are not layers."""
+
+    def checkValueIsAcceptable(
+        self, value: Any, context: QgsProcessingContext | None = None
+    ) -> bool:
+        given = value if isinstance(value, (list, tuple)) else [value]
+        others = [one for one in given if not (isinstance(one, str) and _is_there(one))]
+        if len(others) == len(given):
+            return super().checkValueIsAcceptable(value, context)
+        return not others or super().checkValueIsAcceptable(others, context)
+
+    def clone(self) -> LayersOrNames:
+        copy = LayersOrNames(self.name(), self.description(), self.layerType())
+        copy.fromVariantMap(self.toVariantMap())
+        return copy
+
+
+def _is_there(name: str) -> bool:
+    """Whether a name is that of a file or folder, or a pattern that matches one."""
+    return os.path.exists(name) or any(glob.iglob(name))
+
+
 @_made_of.register(kinds.RastersIn)
 def _rasters_in(kind: Any, parameter: Any) -> Made:
-    return QgsProcessingParameterMultipleLayers, {
-        "layerType": compat.RASTER,
-        **_optional(parameter),
-    }
+    return LayersOrNames, {"layerType": compat.RASTER, **_optional(parameter)}
 
 
 @_made_of.register(kinds.VectorIn)

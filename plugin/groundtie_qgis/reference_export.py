@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any
 
 from qgis.core import (
@@ -17,6 +18,7 @@ from qgis.PyQt.QtGui import QColor, QImage
 
 from .dependencies import rasterio_env
 from .run import new_file
+from .start_files import opened
 from .styling import origin
 from .translation import mark
 
@@ -64,7 +66,8 @@ def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
     pixel *= max(1.0, max(extent.width(), extent.height()) / pixel / _MOST_PX)
     size = QSize(math.ceil(extent.width() / pixel), math.ceil(extent.height() / pixel))
     settings = QgsMapSettings()
-    settings.setLayers(layers)
+    shown = [_without_corners(layer) for layer in layers]  # kept until they are drawn
+    settings.setLayers(shown)
     settings.setDestinationCrs(input.crs())
     settings.setTransformContext(QgsProject.instance().transformContext())
     settings.setBackgroundColor(QColor(Qt.GlobalColor.transparent))
@@ -76,6 +79,40 @@ def drawn(layers: list[Any], input: Any, name: str) -> QgsRasterLayer:
     job.waitForFinished()
     _write(path, job.renderedImage(), settings.visibleExtent(), input.crs())
     return QgsRasterLayer(str(path), name)
+
+
+def _without_corners(layer: Any) -> Any:
+    """Return a layer like this one that is transparent beside a raster that QGIS turns.
+
+    QGIS draws rotated rasters, and those located by RPCs or GCPs, north up and black beside them.
+    """
+    is_file = isinstance(layer, QgsRasterLayer) and layer.providerType() == "gdal"
+    dataset = opened(layer) if is_file else None
+    if dataset is None or not _is_turned(dataset):
+        return layer
+    from osgeo import gdal
+
+    path = str(new_file("turned.vrt"))
+    # QGIS turns with this error of the transform, in pixels, too.
+    with suppress(RuntimeError):  # another plugin may have enabled GDAL exceptions
+        gdal.Warp(path, dataset, format="VRT", dstAlpha=True, errorThreshold=0.2)
+    turned = layer.clone()
+    turned.setDataSource(path, layer.name(), "gdal")
+    if not turned.isValid():
+        return layer  # too few GCPs, by which QGIS cannot turn it either
+    turned.setCrs(layer.crs())
+    for band in range(1, layer.bandCount() + 1):
+        hidden = layer.dataProvider().userNoDataValues(band)
+        turned.dataProvider().setUserNoDataValue(band, hidden)
+    turned.renderer().setAlphaBand(turned.bandCount())
+    return turned
+
+
+def _is_turned(dataset: Any) -> bool:
+    grid = dataset.GetGeoTransform(can_return_null=True)
+    if grid is None:
+        return bool(dataset.GetGCPCount() or dataset.GetMetadata("RPC"))
+    return bool(grid[2] or grid[4])
 
 
 def _write(path: Any, image: QImage, extent: Any, crs: Any) -> None:

@@ -8,17 +8,19 @@ from typing import Any
 
 from qgis.core import (
     NULL,
+    QgsCoordinateReferenceSystem,
     QgsProcessingAlgorithm,
     QgsProcessingContext,
     QgsProcessingFeedback,
     QgsProcessingUtils,
+    QgsRasterLayer,
     QgsVectorFileWriter,
     QgsVectorLayer,
 )
 
 from .definitions import qgis_name, takes_layers
 from .library import errors, kinds
-from .start_files import file_name
+from .start_files import crs_of_file, file_name, without_options
 from .translation import tr
 
 
@@ -51,7 +53,7 @@ class Reader:
         Raises
         ------
         ParameterError
-            A layer is not based on a file.
+            A layer is not based on a file, or has another CRS than its file.
         """
         name, kind = qgis_name(parameter.name), parameter.kind
         given = self._parameters.get(name)
@@ -60,9 +62,9 @@ class Reader:
         if isinstance(kind, kinds.RasterIn):
             return self._raster(kind, name, given)
         if isinstance(kind, kinds.RastersIn):
-            return self._rasters(kind, name, given)
+            return self._rasters(kind, given)
         if isinstance(kind, kinds.VectorIn):
-            return self._vector(name, given)
+            return self._vector(kind, name, given)
         if isinstance(kind, kinds.MaskIn):
             return self._mask(kind, name, given)
         if isinstance(kind, kinds.Choice):
@@ -100,22 +102,31 @@ class Reader:
             return given  # the library's error message is better than QGIS's
         return _file_of(layer, kind)
 
-    def _rasters(self, kind: Any, name: str, given: Any) -> Any:
-        layers = self._algorithm.parameterAsLayerList(self._parameters, name, self._context)
-        names = [given] if isinstance(given, str) else list(given)
-        if len(layers) < len(names):
-            return names  # folders, patterns and tables are not layers
-        return [_file_of(layer, kind) for layer in layers]
+    def _rasters(self, kind: Any, given: Any) -> list[str]:
+        several = given if isinstance(given, (list, tuple)) else [given]
+        return [self._raster_or_name(kind, one) for one in several]
+
+    def _raster_or_name(self, kind: Any, given: Any) -> str:
+        """Return the file of a raster layer; folders, patterns and tables are not layers."""
+        layer = given
+        if isinstance(given, str):
+            layer = QgsProcessingUtils.mapLayerFromString(given, self._context, False)
+            if not isinstance(layer, QgsRasterLayer):
+                return without_options(given)
+        return _file_of(layer, kind)
 
     def _mask(self, kind: Any, name: str, given: Any) -> Any:
         if isinstance(given, str) and Path(given).is_file():
             return given  # a classifier is not a layer, but GDAL may take it for one
         layer = self._algorithm.parameterAsLayer(self._parameters, name, self._context)
         if isinstance(layer, QgsVectorLayer):
-            return self._vector(name, given)
+            return self._vector(kind, name, given)
         return self._raster(kind, name, given)
 
-    def _vector(self, name: str, given: Any) -> Any:
+    def _vector(self, kind: Any, name: str, given: Any) -> Any:
+        layer = self._algorithm.parameterAsVectorLayer(self._parameters, name, self._context)
+        if layer is not None and layer.isModified():  # its file lacks what is not saved yet
+            return _snapshot(layer, tr(kind.label), self._context)
         path = self._algorithm.parameterAsCompatibleSourceLayerPath(
             self._parameters, name, self._context, ["gpkg", "geojson"], "gpkg", self._feedback
         )
@@ -170,11 +181,27 @@ def _snapshot(layer: QgsVectorLayer, label: str, context: QgsProcessingContext) 
 
 
 def _file_of(layer: Any, kind: Any) -> str:
-    """Return the file of a raster layer; raise `ParameterError` if it has none."""
+    """Return the file of a raster layer; `ParameterError` if it has none, or another CRS."""
     provider = layer.providerType()
     if provider != "gdal":
         raise errors.ParameterError(
             f"{tr(kind.label)} must be a raster file, not the layer {layer.name()} of the "
             f"provider {provider}; export it to a file first"
         )
+    _require_crs_of_file(layer, tr(kind.label))
     return file_name(layer)
+
+
+def _require_crs_of_file(layer: Any, label: str) -> None:
+    given, own = layer.crs(), crs_of_file(layer)
+    # One CRS may be written with and without its EPSG code.
+    if given.isValid() and given != own and given.toProj() != own.toProj():
+        raise errors.ParameterError(
+            f"{label}: the layer {layer.name()} has the CRS {_named(given)}, but its file, which "
+            f"is read, has {_named(own)}; assign the right one to the file (Raster > Projections > "
+            "Assign Projection) and to the layer"
+        )
+
+
+def _named(crs: QgsCoordinateReferenceSystem) -> str:
+    return crs.authid() or crs.description() or "none"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -12,8 +13,8 @@ import rasterio
 from rasterio.transform import from_origin
 
 
-def write_raster(path: Path, bands: int = 1) -> Path:
-    grid = {"transform": from_origin(500000, 5000000, 1, 1), "crs": "EPSG:32633"}
+def write_raster(path: Path, bands: int = 1, **other: Any) -> Path:
+    grid = {"transform": from_origin(500000, 5000000, 1, 1), "crs": "EPSG:32633", **other}
     with rasterio.open(path, "w", "GTiff", 20, 20, bands, dtype="uint8", **grid) as raster:
         raster.write(np.ones((bands, 20, 20), np.uint8))
     return path
@@ -190,6 +191,59 @@ class TestRun:
         else:
             assert seen["mask"] == files[kind]
 
+    @pytest.mark.parametrize("name", ["MASK", "REGIONS"])
+    def test_unsaved_edits_of_shapes_count(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        name: str,
+    ) -> None:
+        from qgis.core import QgsVectorLayer
+
+        path = tmp_path / "m.geojson"
+        shapes = [
+            {"type": "Polygon", "coordinates": [[[x, 0], [x + 1, 0], [x, 1]]]} for x in (3, 8)
+        ]
+        features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+        layer = QgsVectorLayer(str(path), "mask")
+        layer.startEditing()
+        layer.deleteFeature(next(layer.getFeatures()).id())
+        seen = called_with(algorithm, {**values, name: layer}, monkeypatch)[name.lower()]
+        (left,) = QgsVectorLayer(str(seen), "seen").getFeatures()
+        assert left.geometry().boundingBox().xMinimum() == 8
+        layer.rollBack()
+        assert called_with(algorithm, {**values, name: layer}, monkeypatch)[name.lower()] == path
+
+    def test_several_rasters_may_be_layers_folders_patterns_and_tables(
+        self,
+        algorithm: Any,
+        values: dict[str, Any],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        from qgis.core import QgsProject, QgsRasterLayer
+
+        (tmp_path / "dates.csv").write_text("file,time\na.tif,2020-01-01\n")
+        (tmp_path / "item.json").write_text('{"type": "Feature", "assets": {}}')
+        (tmp_path / "folder").mkdir()
+        others = ["dates.csv", "item.json", "folder", "*.tif"]
+        names = [str(tmp_path / name) for name in others]
+        layer = QgsRasterLayer(values["INPUT"], "layer")
+        QgsProject.instance().addMapLayer(layer)
+        for given in (*names, *([name] for name in names), [layer.id(), *names]):
+            assert check(algorithm, {**values, "OTHERS": given}) == (True, "")
+        no_file = "Incorrect parameter value for OTHERS"
+        for given in ("none*.tif", [""], [*names, str(tmp_path / "none.tif")]):
+            assert check(algorithm, {**values, "OTHERS": given}) == (False, no_file)
+        seen = called_with(algorithm, {**values, "OTHERS": [layer, *names]}, monkeypatch)
+        assert seen["others"] == (Path(values["INPUT"]), *map(Path, names))
+        table = called_with(algorithm, {**values, "OTHERS": names[0]}, monkeypatch)
+        assert table["others"] == (Path(names[0]),)
+        QgsProject.instance().clear()
+
     def test_names_of_gdal_stay_as_they_are(
         self, algorithm: Any, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -360,6 +414,43 @@ class TestCheck:
             "Reference must be a raster file, not the layer Map of the provider wms; "
             "export it to a file first"
         )
+
+    @pytest.mark.parametrize("name", ["REFERENCE", "OTHERS", "MASK"])
+    def test_a_crs_that_only_the_layer_has_is_refused(
+        self, algorithm: Any, values: dict[str, Any], tmp_path: Path, name: str
+    ) -> None:
+        """The tool reads the file; until that has the CRS, its pixels are of unknown size."""
+        from qgis.core import QgsCoordinateReferenceSystem, QgsProject, QgsRasterLayer
+
+        path = write_raster(tmp_path / "m.tif", crs=None)
+        layer = QgsRasterLayer(str(path), "Map")
+        QgsProject.instance().addMapLayer(layer)
+        given = {**values, name: layer.id()}
+        assert check(algorithm, given) == (True, "")
+        layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32633"))
+        assert check(algorithm, given) == (
+            False,
+            f"{name.capitalize()}: the layer Map has the CRS EPSG:32633, but its file, which is "
+            "read, has none; assign the right one to the file (Raster > Projections > Assign "
+            "Projection) and to the layer",
+        )
+        with rasterio.open(path, "r+") as raster:
+            raster.crs = "EPSG:32633"
+        assert check(algorithm, given) == (True, "")
+        QgsProject.instance().clear()
+
+    def test_a_crs_of_a_layer_without_georeferencing_says_nothing(
+        self, algorithm: Any, values: dict[str, Any], tmp_path: Path
+    ) -> None:
+        """QGIS can be set to give the project's CRS to every layer that has none."""
+        from qgis.core import QgsCoordinateReferenceSystem, QgsProject, QgsRasterLayer
+
+        path = write_raster(tmp_path / "m.tif", crs=None, transform=None)
+        layer = QgsRasterLayer(str(path), "Map")
+        layer.setCrs(QgsCoordinateReferenceSystem("EPSG:32633"))
+        QgsProject.instance().addMapLayer(layer)
+        assert check(algorithm, {**values, "REFERENCE": layer.id()}) == (True, "")
+        QgsProject.instance().clear()
 
     def test_a_check_has_no_layer_loaded(self, algorithm: Any, values: dict[str, Any]) -> None:
         from qgis.core import (

@@ -10,6 +10,8 @@ import pytest
 import rasterio
 from desktops import Desktop, pair
 from noise_pairs import ORIGIN, write_raster
+from rasterio.control import GroundControlPoint
+from rasterio.transform import from_origin
 
 
 def test_the_map_as_it_is_drawn_may_be_the_reference(desktop: Desktop, tmp_path: Path) -> None:
@@ -46,6 +48,65 @@ def test_where_no_layer_draws_there_is_no_ground(desktop: Desktop, tmp_path: Pat
         first, last = (drawn.index(ORIGIN[0] + x, ORIGIN[1] - y) for x, y in ((3, 3), (197, 380)))
         assert mask[first[0] : last[0], first[1] : last[1]].all()
         assert not mask[:, drawn.index(ORIGIN[0] + 203, ORIGIN[1])[1] :].any()
+
+
+def write_turned(path: Path, located_by: str) -> rasterio.Affine:
+    """Write a raster turned by 30 degrees, by its grid or by points; return its grid."""
+    turn = rasterio.Affine.translation(*ORIGIN) * rasterio.Affine.rotation(-30)
+    grid = turn * rasterio.Affine.scale(1, -1)
+    write_raster(path, np.full((1, 200, 260), 90.0), grid if located_by == "grid" else None)
+    if located_by == "points":
+        corners = [(0, 0), (0, 260), (200, 0), (200, 260)]
+        points = [GroundControlPoint(r, c, *(grid * (c, r))) for r, c in corners]
+        with rasterio.open(path, "r+") as raster:
+            raster.gcps = points, "EPSG:32633"
+    return grid
+
+
+@pytest.mark.filterwarnings("ignore:Dataset has no geotransform")
+@pytest.mark.parametrize("located_by", ["grid", "points"])
+def test_beside_a_turned_raster_there_is_no_ground(
+    desktop: Desktop, tmp_path: Path, located_by: str
+) -> None:
+    from groundtie_qgis.reference_export import with_files
+    from qgis.core import QgsRasterRange
+
+    grid = write_turned(tmp_path / "turned.tif", located_by)
+    write_raster(tmp_path / "input.tif", np.ones((1, 200, 200)), from_origin(*ORIGIN, 1, 1))
+    turned, input = desktop.load(tmp_path, "turned", "input")
+    desktop.canvas.setLayers([turned])
+    made, _ = with_files(None, input, desktop.canvas)
+    with rasterio.open(made.source()) as drawn:
+        mask = drawn.dataset_mask() > 0
+        rows, columns = np.indices(mask.shape) + 0.5
+        across, down = ~grid * drawn.transform * (columns, rows)
+    # by how many pixels a place lies within the raster
+    depth = np.minimum(np.minimum(across, 260 - across), np.minimum(down, 200 - down))
+    assert mask[depth > 1.5].all() and (depth > 1.5).sum() > 10_000
+    assert not mask[depth < -1.5].any() and (depth < -1.5).sum() > 10_000
+    # What the layer hides of its file stays hidden, and the layer itself is as it was.
+    turned.dataProvider().setUserNoDataValue(1, [QgsRasterRange(90, 90)])
+    made, _ = with_files(None, input, desktop.canvas)
+    with rasterio.open(made.source()) as drawn:
+        assert not drawn.dataset_mask().any()
+    assert turned.source() == str(tmp_path / "turned.tif")
+
+
+@pytest.mark.filterwarnings("ignore:Dataset has no geotransform")
+def test_a_raster_with_too_few_points_to_turn_it_is_drawn_as_it_is(
+    desktop: Desktop, tmp_path: Path
+) -> None:
+    from groundtie_qgis.reference_export import with_files
+
+    write_raster(tmp_path / "one.tif", np.full((1, 20, 20), 90.0), None)
+    with rasterio.open(tmp_path / "one.tif", "r+") as raster:
+        raster.gcps = [GroundControlPoint(0, 0, *ORIGIN)], "EPSG:32633"
+    reference, input = pair(tmp_path, desktop)
+    desktop.canvas.setLayers([*desktop.load(tmp_path, "one"), reference])
+    made, _ = with_files(None, input, desktop.canvas)
+    with rasterio.open(made.source()) as drawn:
+        row, column = drawn.index(ORIGIN[0] + 100, ORIGIN[1] - 100)
+        assert drawn.dataset_mask()[row, column]
 
 
 def test_the_map_shows_nothing_of_the_input(
