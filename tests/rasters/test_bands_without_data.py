@@ -158,6 +158,7 @@ def test_a_nodata_value_of_64_bits_of_an_array(tmp_path: Path) -> None:
             valid = dataset.read_masks(1) > 0
             assert not valid[: dataset.height // 2].any()
             assert valid[dataset.height // 2 :].all()
+            np.testing.assert_array_equal(np.unique(dataset.read()), [50, nodata])
 
 
 def test_masks_of_single_bands_count(tmp_path: Path) -> None:

@@ -56,6 +56,30 @@ def test_what_is_invalid_has_no_weight(
     _assert_near(np.where(known, found, 0), np.where(known, expected, 0), "uint16")
 
 
+@pytest.mark.parametrize("dtype", ["int64", "uint64"])
+@pytest.mark.parametrize("shape", [(3, 1100), (513, 1025)])
+def test_overviews_of_64_bits_are_means_of_what_is_valid(
+    tmp_path: Path, dtype: str, shape: tuple[int, int]
+) -> None:
+    """Also of odd sizes, where GDAL's averages of windows of 64 bits are none."""
+    image = RNG.integers(100, 60_000, (1, *shape)).astype(dtype)
+    for valid in (np.ones(shape, bool), RNG.random(shape) < 0.3):
+        found, shown = _overview(tmp_path, image, valid, nodata=None)
+        expected, known = _means(image, valid[None])
+        np.testing.assert_array_equal(shown, known)
+        _assert_near(np.where(known, found, 0), np.where(known, expected, 0), dtype)
+
+
+@pytest.mark.parametrize("dtype", ["int64", "uint64"])
+def test_the_largest_numbers_of_64_bits_stay_the_largest(tmp_path: Path, dtype: str) -> None:
+    """Double precision rounds them beyond the range; borders of pixels are rounded, too."""
+    highest = np.iinfo(dtype).max
+    image = np.full((1, *ODD), highest, dtype)
+    found, _ = _overview(tmp_path, image, np.ones(ODD, bool), nodata=None)
+    limit = sum(ODD) * np.finfo(float).eps
+    np.testing.assert_allclose(found.astype(float), float(highest), rtol=limit)
+
+
 @pytest.mark.parametrize(("dtype", "nodata"), [("uint8", 7), ("float32", np.nan)])
 def test_a_nodata_value_counts_beside_an_alpha_band(
     tmp_path: Path, dtype: str, nodata: float

@@ -123,6 +123,17 @@ def test_a_palette_has_overviews_of_its_own_values(tmp_path: Path) -> None:
         assert set(np.unique(overview.read())) == {1, 200}
 
 
+@pytest.mark.parametrize("ending", [".cog.tif", ".COG.TIFF"])
+def test_a_name_as_long_as_the_system_allows_makes_a_cog(tmp_path: Path, ending: str) -> None:
+    path = write_raster(tmp_path / "a.tif", NOISE, GRID)
+    out = tmp_path / f"{'x' * (255 - len(ending))}{ending}"
+    with open_raster(path) as source, Outputs() as outputs:
+        warp_raster(source, GRID.map_to_pixel, GRID, outputs.stage(out))
+    with rasterio.open(out) as dataset:
+        assert dataset.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+    assert {path.name for path in tmp_path.iterdir()} == {"a.tif", out.name}
+
+
 def test_what_geotiff_cannot_hold_lies_beside_it(tmp_path: Path) -> None:
     """A rotated pole; without it nobody knows where the pixels lie."""
     pole = CRS.from_user_input("+proj=ob_tran +o_proj=longlat +o_lat_p=40 +o_lon_p=0 +lon_0=180")

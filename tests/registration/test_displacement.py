@@ -10,12 +10,13 @@ import pytest
 import rasterio
 from affine import Affine
 from contexts import context
+from rasterio.crs import CRS
 from textured_pairs import listing
 
 from groundtie.context import Context
-from groundtie.geometry.models import Frame, PolynomialModel
+from groundtie.geometry.models import Frame, PolynomialModel, shift_model
 from groundtie.geometry.transform import Transform
-from groundtie.rasters.grid import PIXEL_COORDINATES, Grid
+from groundtie.rasters.grid import LON_LAT, PIXEL_COORDINATES, Grid, reproject
 from groundtie.registration.delivery import RegistrationFiles
 from groundtie.registration.displacement import displacement_field, write_displacement
 from groundtie.registration.evidence import RegistrationEvidence
@@ -81,6 +82,34 @@ def test_a_curved_model_gets_smaller_pixels(evidence: RegistrationEvidence) -> N
     xy = grid.pixel_to_map([[3, 5], [4, 5]])
     expected = xy - curved(xy)
     np.testing.assert_allclose(field[:2, 5, 3:5].T, expected, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("crs", "transform"),
+    [
+        ("EPSG:4326", Affine(0.025, 0, 10, 0, -0.025, 70)),
+        ("EPSG:3857", Affine(2500, 0, 1e6, 0, -2500, 9.9e6)),
+    ],
+)
+def test_metres_are_those_at_each_place(
+    evidence: RegistrationEvidence, crs: str, transform: Affine
+) -> None:
+    """By maps around places between 60° N and 70° N, where units change by up to a third."""
+    grid = Grid(transform, CRS.from_string(crs), 200, 400)
+    shift = np.array([-2.0, -1.0]) * grid.pixel_size
+    model = Transform(shift_model(*shift), grid.crs, grid)
+    moved = replace(evidence, grid=grid, estimate=replace(evidence.estimate, transform=model))
+    field, nodes = displacement_field(moved)
+    for row in (1, field.shape[1] // 2, field.shape[1] - 2):
+        place = nodes.pixel_to_map([[1, row]])
+        (lon, lat) = reproject(place, grid.crs, LON_LAT)[0]
+        around = CRS.from_string(f"+proj=aeqd +lon_0={lon} +lat_0={lat} +datum=WGS84")
+        sides = np.diag(grid.pixel_size) / 2
+        ends = (reproject(place + way, grid.crs, around) for way in (sides, -sides))
+        width, height = np.diag(np.subtract(*ends))
+        sigma_px = moved.error.standard_deviation_px(grid.map_to_pixel(place))[0]
+        expected = (2 * width, height, sigma_px * max(width, height))
+        np.testing.assert_allclose(field[:, row, 1], expected, rtol=1e-3)
 
 
 def test_without_georeferencing_it_is_in_pixels(

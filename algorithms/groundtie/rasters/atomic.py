@@ -108,7 +108,8 @@ class Outputs:
             with writing(final):
                 self._claims[folder] = Claim(folder, self._token)
         fits = len(os.fsencode(final.name)) <= _LONGEST_IN_HIDDEN
-        stem = final.stem if fits else f"output-{next(self._names)}"
+        # The end of a long stem is kept, as `.cog` decides the kind of file.
+        stem = final.stem if fits else f"output-{next(self._names)}{final.stem[-len('.cog') :]}"
         return folder / hidden_name(self._token, role, stem, final.suffix)
 
     def _commit(self) -> None:

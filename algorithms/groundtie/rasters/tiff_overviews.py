@@ -13,13 +13,14 @@ from scipy import sparse
 
 from .averaging import overlaps, weighted_sums
 from .handles import FileHandles
-from .metadata import numpy_dtype
+from .metadata import numpy_dtype, rounded
 from .nodata import put_nodata
 from .tiff_directories import Image
 from .windows import Mask, Window
 
-# Types whose means all fit into double precision.
-_MEANS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+# Types whose means are computed in single or double precision.
+_MEANS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64",
+          "float32", "float64")  # fmt: skip
 
 Task = tuple[list[int], Window]
 
@@ -35,12 +36,16 @@ class Reduced:
     level
         The overview, half the size of the previous level.
     nearest
-        Whether pixels are picked; otherwise they are averages of valid pixels.
+        Whether pixels are picked; otherwise they are averages of valid pixels. Those of 64 bits
+        are computed in double precision: of large numbers they lose the last digits.
+    nodata
+        The file's nodata value, or None. rasterio does not read all that 64 bits can hold.
     """
 
     handles: FileHandles
     level: Image
     nearest: bool
+    nodata: float | None
 
     def tasks(self, bands: int) -> list[Task]:
         """Return the groups of bands, from 1, and windows that are processed at a time."""
@@ -97,7 +102,7 @@ class Reduced:
         rows, down = _shares(dataset.height, made.height, window.row, window.height, precision)
         cols, across = _shares(dataset.width, made.width, window.col, window.width, precision)
         place = rasterio.windows.Window.from_slices(rows, cols)
-        masks = _masks(dataset, bands, place)
+        masks = _masks(dataset, bands, place, self.nodata)
         if masks is None:
             return None
         values = dataset.read(bands, window=place)
@@ -112,8 +117,9 @@ class Reduced:
                 valid[:] = weight > 0
                 weight[~valid] = 1
             mean = weighted_sums(down, across, band.astype(precision)) / weight
-            into[:] = mean if precision == values.dtype else np.floor(mean + 0.5)
-            put_nodata(into, valid, dataset.nodata)
+            whole = precision != values.dtype
+            into[:] = rounded(np.floor(mean + 0.5), values.dtype) if whole else mean
+            put_nodata(into, valid, self.nodata)
         return means, known[0]
 
 
@@ -130,7 +136,9 @@ def _shares(
     return pixels, overlaps(edges - pixels.start, pixels.stop - pixels.start, precision)
 
 
-def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | None:
+def _masks(
+    dataset: Any, bands: list[int], place: Any, nodata: float | None
+) -> list[Mask | None] | None:
     """Return the valid pixels of each band, None for all pixels; None if some are transparent."""
     masks: dict[int, Mask | None] = {}
     keys = []
@@ -141,8 +149,8 @@ def _masks(dataset: Any, bands: list[int], place: Any) -> list[Mask | None] | No
             continue
         if MaskFlags.nodata in flags and ColorInterp.alpha in dataset.colorinterp:
             # The same as rasterio's masks, which warn that nodata takes precedence over alpha.
-            values, nodata = dataset.read(number, window=place), dataset.nodata
-            mask = ~np.isnan(values) if np.isnan(nodata) else values != nodata
+            values = dataset.read(number, window=place)
+            mask = values != nodata if nodata == nodata else ~np.isnan(values)
         else:
             mask = dataset.read_masks(number, window=place) == 255
         masks[keys[-1]] = None if mask.all() else mask

@@ -110,7 +110,12 @@ def create_like(
         TiledFile(first, levels, pixels, source.count, pool, 2 * workers) as file,
     ):
         yield file
-        _write_overviews(file, nearest=source.colormap is not None, progress=progress)
+        _write_overviews(
+            file,
+            nearest=source.colormap is not None,
+            nodata=nodata if whole is None else whole,
+            progress=progress,
+        )
         file.finish(len(levels))
         if is_cog:
             file.copy_as_cog(path)
@@ -226,7 +231,9 @@ def _describe(dataset: Any, source: RasterSource) -> None:
         dataset.units = [band.unit or "" for band in bands]
 
 
-def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> None:
+def _write_overviews(
+    file: TiledFile, *, nearest: bool, nodata: float | None, progress: Progress
+) -> None:
     """Write all overviews, each from the previous level."""
     count = len(file.levels)
     for number in range(1, count):
@@ -234,7 +241,7 @@ def _write_overviews(file: TiledFile, *, nearest: bool, progress: Progress) -> N
         part = progress.part((number - 1) / (count - 1), number / (count - 1))
         before = FileHandles(os.fspath(file.path), None if number == 1 else number - 2)
         with contextlib.closing(before) as handles:
-            reduced = Reduced(handles, file.levels[number], nearest)
+            reduced = Reduced(handles, file.levels[number], nearest, nodata)
             tasks = reduced.tasks(file.bands)
             made = zip(tasks, in_order(file.executor, reduced.read, tasks, file.ahead), strict=True)
             for (bands, window), (values, valid) in part.over(made, len(tasks)):

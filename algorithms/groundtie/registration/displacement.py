@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from affine import Affine
 
-from ..rasters.grid import FloatArray, Grid, compose, mesh
+from ..rasters.grid import FloatArray, Grid, compose, mesh, metres_per_unit_at
 from ..rasters.lattice import lattice
 from ..rasters.metadata import BandInfo
 from ..rasters.reading import RasterSource
@@ -50,11 +50,12 @@ def displacement_field(evidence: RegistrationEvidence) -> tuple[FloatArray, Grid
     grid = matching.on_same_map(place, cols, rows)
     px = mesh(np.arange(cols), np.arange(rows))
     xy = grid.pixel_to_map(px)
-    t, per_unit = matching.transform, matching.metres_per_unit
-    x, y = values[:2].copy()
-    values[0] = (t.a * x + t.b * y) * per_unit[0]
-    values[1] = (t.d * x + t.e * y) * per_unit[1]
-    values[2] *= max(matching.pixel_sides_m)
+    # Of each place, as the scale of a map in degrees or of Mercator differs over a scene.
+    x_m, y_m = metres_per_unit_at(xy, matching.crs).T.reshape(2, rows, cols)
+    t, (x, y) = matching.transform, values[:2].copy()
+    values[0] = (t.a * x + t.b * y) * x_m
+    values[1] = (t.d * x + t.e * y) * y_m
+    values[2] *= np.maximum(np.hypot(t.a * x_m, t.d * y_m), np.hypot(t.b * x_m, t.e * y_m))
     shown = transform.input_grid.contains(transform(xy)).reshape(rows, cols)
     return np.where(shown, values, np.nan), grid
 
