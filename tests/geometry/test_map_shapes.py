@@ -11,6 +11,8 @@ from raster_files import utm_grid
 from rasterio.crs import CRS
 from shapely.geometry import MultiPolygon, Polygon, box, mapping
 
+from groundtie.errors import VectorLayerError
+from groundtie.geometry.map_shapes import MapShapes
 from groundtie.geometry.vector_layers import VectorLayer
 from groundtie.masks.layer import drawn_onto
 from groundtie.rasters.grid import Grid, reproject
@@ -68,3 +70,23 @@ def test_a_polygon_across_the_antimeridian(west: float, epsg: int, is_cut: bool)
 
 def test_what_lies_elsewhere_covers_nothing() -> None:
     assert covered(mapping(box(100, 20, 110, 30)), DEGREES, SCENE) == 0.0
+
+
+def test_a_polygon_that_crosses_itself_covers_what_it_covers() -> None:
+    """A triangle whose tip is the scene's middle; beyond its surroundings it crosses itself."""
+    shapes = MapShapes.around(SCENE, DEGREES)
+    assert shapes is not None
+    left, lower, right, upper = shapes.box
+    ring = np.array([(0.2, 1.0), (0.8, 1.0), (0.8, 3.0), (0.5, 0.5), (0.2, 3.0)])
+    area = Polygon(ring * [right - left, upper - lower] + [left, lower])
+    assert not area.is_valid
+    # Sides of 0.3 in 2.5, up to a sixth: of the scene, whose side is a third.
+    tip = 0.5 * (2 / 6 * 0.3 / 2.5) / 6 * 9
+    assert covered(mapping(area), DEGREES, SCENE) == pytest.approx(tip, abs=0.01)
+
+
+def test_what_has_no_place_on_the_images_map_is_one_line() -> None:
+    """Beyond the pole, within the scene's surroundings."""
+    grid = Grid(Affine(1000, 0, 400_000, 0, -1000, 9_995_000), CRS.from_epsg(32632), 200, 200)
+    with pytest.raises(VectorLayerError, match="cannot use a geometry of layer"):
+        covered(mapping(box(0, 80, 20, 95)), DEGREES, grid)

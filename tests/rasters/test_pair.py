@@ -21,7 +21,7 @@ from groundtie.errors import (
     SameFileError,
 )
 from groundtie.rasters.grid import PIXEL_COORDINATES, Grid, compose, reproject
-from groundtie.rasters.pair import Image, ImagePair, coarser_m, default_radius_m, make_pair
+from groundtie.rasters.pair import Image, ImagePair, coarser_m, make_pair
 from groundtie.rasters.patch import Patch
 from groundtie.rasters.reading import RasterSource, open_raster
 
@@ -192,14 +192,6 @@ def test_a_pixel_size_between_those_of_both_images(files: Files) -> None:
     assert pair.overlap_px == (120, 100)
     with pytest.raises(ParameterError, match=r"of 9 is finer than both images' \(10\)"):
         make_pair(fine, coarse, matching_pixel_size_m=9.0)
-
-
-@pytest.mark.parametrize(
-    ("pixel_m", "is_on_map", "radius"),
-    [(1.0, True, 100.0), (10.0, True, 200.0), (1.0, False, 20.0)],
-)
-def test_the_default_search_radius(pixel_m: float, is_on_map: bool, radius: float) -> None:
-    assert default_radius_m(pixel_m, is_on_map) == pytest.approx(radius)
 
 
 @pytest.mark.parametrize(

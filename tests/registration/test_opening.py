@@ -15,6 +15,7 @@ from rasterio.crs import CRS
 from groundtie.context import Context
 from groundtie.errors import ParameterError
 from groundtie.rasters.grid import Grid
+from groundtie.rasters.pair import default_radius_m
 from groundtie.registration.opening import open_pair, usual_radius_m
 from groundtie.registration.specification import COREGISTER, OPTICAL, Specification
 
@@ -51,6 +52,14 @@ def test_the_usual_radius_is_what_is_searched(
         found = usual_radius_m(pair.reference.source.grid, pair.input.source.grid, spec.free)
         assert found == pytest.approx(radius_m)
         assert pair.limits.radius == pytest.approx(radius_m)
+
+
+@pytest.mark.parametrize(
+    ("pixel_m", "is_on_map", "radius"),
+    [(1.0, True, 100.0), (10.0, True, 200.0), (1.0, False, 20.0)],
+)
+def test_the_default_search_radius(pixel_m: float, is_on_map: bool, radius: float) -> None:
+    assert default_radius_m(pixel_m, is_on_map) == pytest.approx(radius)
 
 
 @pytest.mark.parametrize(

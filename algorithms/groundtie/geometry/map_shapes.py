@@ -72,7 +72,7 @@ class MapShapes:
         Raises
         ------
         ValueError, ShapelyError
-            The geometry is damaged.
+            The geometry is damaged, or has no place on the grid's map.
         """
         shape, turn = shapely.geometry.shape(geometry), full_turn(self.crs)
         copies = [shape]
@@ -84,11 +84,12 @@ class MapShapes:
         if shape.is_empty:
             return []
         left, lower, right, upper = shape.bounds
-        box = self.box
-        if not (box[0] <= left and box[1] <= lower and right <= box[2] and upper <= box[3]):
+        box, kind = self.box, str(shape.geom_type).removeprefix("Multi")
+        is_near = box[0] <= left and box[1] <= lower and right <= box[2] and upper <= box[3]
+        # Polygons that cross themselves would become their complement.
+        if not is_near and shape.is_valid:
             shape = shapely.ops.clip_by_rect(shape, *box)
-        # What the box touches only is a line or a point.
-        kind = str(shape.geom_type).removeprefix("Multi")
+        # What the box only touches is of another kind: a line or a point.
         return [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == kind]
 
     def _on_grids_map(self, part: Any) -> dict[str, Any]:
@@ -103,6 +104,8 @@ class MapShapes:
         xy = np.array(of.coords, float)[:, :2]
         if self.crs != self.grid.crs:
             xy = self._reprojected(_divided(xy, self.piece))
+            if not np.isfinite(xy).all():
+                raise ValueError("a part near the image has no place on its map")
         return list(xy.tolist())
 
     def _reprojected(self, xy: FloatArray) -> FloatArray:

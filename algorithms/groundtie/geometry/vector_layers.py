@@ -71,7 +71,7 @@ class VectorLayer:
         GeoreferencingError
             Only one of the layer and the map has a CRS.
         VectorLayerError
-            A geometry is damaged, or the grid has no place on the layer's map.
+            A geometry is damaged, or it or the grid has no place on the other's map.
         """
         crs = grid.crs
         require_both_or_none(self.crs, crs, f"{self.path} and the image")
@@ -91,7 +91,7 @@ class VectorLayer:
             try:
                 located = [(feature, part) for feature, one in located for part in around.of(one)]
             except (ValueError, TypeError, ShapelyError) as error:
-                raise VectorLayerError(f"a geometry of {self.path} is damaged: {error}") from error
+                raise VectorLayerError(f"cannot use a geometry of {self.path}: {error}") from error
         features = ({**feature, "geometry": geometry} for feature, geometry in located)
         return replace(self, crs=crs, features=tuple(features))
 

@@ -7,6 +7,7 @@ the phase of the pixels differ. Content that is drawn into both arrays is the sa
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -83,7 +84,7 @@ class Windows:
         of_one, of_other, of_both = (np.asarray(image, np.float32) for image in found)
         return cls(valid, of_one, of_other, of_both, (mean, other_mean))
 
-    @property
+    @cached_property
     def same(self) -> Mask:
         """Pixels around which the patches vary alike."""
         both = self.one + self.other
