@@ -285,6 +285,24 @@ def test_reduction_of_a_small_input_on_a_map_of_the_world() -> None:
     assert reduction(world, world.to_pixels_of(image), image.size) == (6, 11)
 
 
+@pytest.mark.parametrize(("shift", "shown"), [(0.0, True), (400.0, False)])
+def test_a_tile_is_resampled_by_few_exact_positions(
+    tmp_path: Path, shift: float, shown: bool
+) -> None:
+    """Tiles beside the image, of which they show nothing, are common, too."""
+    asked = []
+
+    def to_px(xy: np.ndarray) -> np.ndarray:
+        asked.append(len(xy))
+        return xy * 1.01 + shift
+
+    path = write_raster(tmp_path / "input.tif", np.ones((300, 300), np.float32))
+    with open_raster(path) as source:
+        _, valid = sample(source, Grid(PIXEL_COORDINATES, None, 256, 256), to_px)
+    assert valid.all() == valid.any() == shown
+    assert sum(asked) < 256 * 256 / 50
+
+
 def test_the_source_window_ignores_unknown_positions() -> None:
     px = np.mgrid[:20, :30][::-1] + 20_000.0
     known = source_window(px, (40_000, 40_000), "cubic", (2, 2))

@@ -311,12 +311,13 @@ def sample_by(
             return read(window, None)
         px = nodes.coordinates()
     size = source.grid.size
+    if not lies_inside(_nearest_pixels(px), *size, 0).any():
+        nothing, shape = read(Window(0, 0, 0, 0), None)[0], (grid.height, grid.width)
+        return np.zeros((*nothing.shape[:-2], *shape), np.float32), np.zeros(shape, bool)
     if factor is None:
         factor = (1, 1) if method == "nearest" else reduction(grid, to_input_px, size)
     part = read_around(px, size, method, factor, read)
-    if part is None:
-        nothing, shape = read(Window(0, 0, 0, 0), None)[0], (grid.height, grid.width)
-        return np.zeros((*nothing.shape[:-2], *shape), np.float32), np.zeros(shape, bool)
+    assert part is not None  # some of the positions lie inside
     return resample(*part, method)
 
 
