@@ -13,10 +13,9 @@ from affine import Affine
 from numpy.typing import NDArray
 
 import groundtie
-from groundtie.rasters.grid import Grid, compose
+from groundtie.rasters.grid import Grid, PointFunction, compose
 
 from ..accuracy import FloatArray, lattice
-from ..accuracy import Mapping as PixelMapping
 from ..cases import CRS, REFERENCE_TRANSFORM, write_image
 
 Image = NDArray[np.uint8]
@@ -46,7 +45,7 @@ class Source:
 
     reference: Image
     input: Image
-    to_input: PixelMapping
+    to_input: PointFunction
 
 
 @dataclass(frozen=True, eq=False)
