@@ -29,6 +29,7 @@ from .accuracy import FloatArray, lattice
 from .cases import (
     KINDS,
     REFERENCE_TRANSFORM,
+    SAR_SAR,
     RealCase,
     draw_shift,
     image_size,
@@ -43,7 +44,6 @@ ACCEPTED, REFUSED, FAILED = "accepted", "refused", "failed"
 _VERDICTS = {0: ACCEPTED, 3: REFUSED}
 
 LARGEST_SHIFT_PX = 20.0
-SAR_SAR = "sar-sar"
 BIASES = (1, 2)
 
 _TRANSFORM, _RPC = "transform.json", "refined_RPC.TXT"

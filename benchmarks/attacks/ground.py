@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..accuracy import FloatArray
-from ..cases import SAR_OPTICAL
+from ..cases import SAR_OPTICAL, SAR_SAR
 from ..series_scenes import aged
 from .catalogue import CONTROLS, GROUND, Attack, Make, Setting, direction, resampled
 from .effects import snow_cover
 from .overlays import Overlay, bump, cloud_deck, smooth_noise
 from .pairs import Change, Image, Pair, Source, to_bytes
-from .scenes import SAR_SAR, Scene
+from .scenes import Scene
 
 Shape = tuple[int, int]
 

@@ -11,11 +11,10 @@ from affine import Affine
 from groundtie.rasters.grid import compose
 
 from ..accuracy import FloatArray
-from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, SAR_SAR
 from .catalogue import REPETITION, Attack, Make, Setting, direction
 from .overlays import smooth_noise
 from .pairs import Change, Image, Pair, join, pixels, render, to_bytes
-from .scenes import SAR_SAR
 
 # Takes positions along and across the rows, in periods; returns the brightness, from 0 to 1.
 Pattern = Callable[[FloatArray, FloatArray], FloatArray]
