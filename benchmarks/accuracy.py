@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-Mapping = Callable[[FloatArray], FloatArray]
+from groundtie.rasters.grid import FloatArray, PointFunction, mesh
 
 # An accepted registration is correct up to the first error and silently wrong beyond the second;
 # the uncertainty of the truth is added to both.
@@ -45,12 +42,12 @@ class Truth:
     linear: FloatArray
 
     @classmethod
-    def on_lattice(cls, mapping: Mapping, size: tuple[int, int], linear: FloatArray) -> Truth:
+    def on_lattice(cls, mapping: PointFunction, size: tuple[int, int], linear: FloatArray) -> Truth:
         """Return the truth on a lattice over the whole reference of `size` (columns, rows)."""
         px = lattice(size)
         return cls(px, mapping(px), linear)
 
-    def off_px(self, found: Mapping) -> FloatArray:
+    def off_px(self, found: PointFunction) -> FloatArray:
         """Return the errors of a mapping in reference pixels, shape (n, 2).
 
         Parameters
@@ -60,15 +57,14 @@ class Truth:
         """
         return (found(self.reference_px) - self.input_px) @ np.linalg.inv(self.linear).T
 
-    def error_px(self, found: Mapping) -> float:
+    def error_px(self, found: PointFunction) -> float:
         """Return the root mean square error of a mapping in reference pixels; see `off_px`."""
         return float(np.sqrt(np.mean(np.sum(self.off_px(found) ** 2, axis=1))))
 
 
 def lattice(size: tuple[int, int]) -> FloatArray:
     """Return a lattice (col, row) over an image of `size` (columns, rows), including its border."""
-    side = [np.linspace(0, count - 1, _LATTICE) for count in size]
-    return np.stack(np.meshgrid(*side), axis=-1).reshape(-1, 2)
+    return mesh(*(np.linspace(0, count - 1, _LATTICE) for count in size))
 
 
 def classify(accepted: bool, error_px: float, sigma_px: float) -> str:

@@ -17,10 +17,11 @@ import groundtie
 from groundtie.errors import NotRegisteredError
 from groundtie.geometry.transform import Transform
 from groundtie.kinds import plain
+from groundtie.rasters.grid import PointFunction
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.specification import Specification
 
-from .accuracy import CRASHED, REFUSED, FloatArray, Mapping, Truth, classify
+from .accuracy import CRASHED, REFUSED, FloatArray, Truth, classify
 from .pipeline_runs import register_specified
 
 
@@ -116,7 +117,10 @@ class Try:
 
     def unregistered(self, name: str, group: str, sigma_px: float) -> Outcome:
         """Return the outcome of a call without a result."""
-        return unregistered(self.verdict, name, group, sigma_px, self.seconds, self.reason)
+        verdict, nan = self.verdict, math.nan
+        return Outcome(
+            name, group, verdict, verdict, nan, nan, sigma_px, self.seconds, nan, "", self.reason
+        )
 
 
 def tried(call: Callable[[], Any]) -> Try:
@@ -181,7 +185,7 @@ def attempt(
     )
 
 
-def on_pixels(transform: Transform, reference: Path) -> Mapping:
+def on_pixels(transform: Transform, reference: Path) -> PointFunction:
     """Return the function from reference pixels to input pixels of a transform."""
     with open_raster(reference) as source:
         grid = source.grid
@@ -190,16 +194,6 @@ def on_pixels(transform: Transform, reference: Path) -> Mapping:
         return transform(grid.pixel_to_map(px))
 
     return mapping
-
-
-def unregistered(
-    verdict: str, name: str, group: str, sigma_px: float, seconds: float, reason: str
-) -> Outcome:
-    """Return the outcome of a registration that was refused or crashed."""
-    unknown = math.nan
-    return Outcome(
-        name, group, verdict, verdict, unknown, unknown, sigma_px, seconds, unknown, "", reason
-    )
 
 
 def accepted(outcomes: Iterable[Outcome]) -> list[Outcome]:

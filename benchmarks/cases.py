@@ -27,8 +27,8 @@ from .attempt import Pair
 CRS = "EPSG:32633"
 REFERENCE_TRANSFORM = Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 5_000_000.0)
 
-SAR_OPTICAL = "sar-optical"
-KINDS = (SAR_OPTICAL, "sar-sar", "optical-optical", "optical-infrared", "day-night")
+SAR_OPTICAL, SAR_SAR = "sar-optical", "sar-sar"
+KINDS = (SAR_OPTICAL, SAR_SAR, "optical-optical", "optical-infrared", "day-night")
 
 # Cases of another case's place, found by visual inspection: the file names do not show it.
 _SAME_PLACE = {"ss-yellow-c": "ss-meander", "oo-cloudy-sentinel": "so-cloudy-sentinel"}

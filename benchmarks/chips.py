@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from groundtie.context import Context, threads
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.matcher import Places
-from groundtie.rasters.grid import Grid
+from groundtie.rasters.grid import Grid, mesh
 from groundtie.similarity.description import BORDER_PX
 from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SIMILARITIES, SimilaritySettings
@@ -119,7 +119,7 @@ def chip_centres(grid: Grid, chip_px: int, most: int) -> NDArray[np.int_]:
     """Return centres (col, row) of chips every `SPACING_PX`, evenly thinned to at most `most`."""
     margin = chip_px // 2 + RADIUS_PX + BORDER_PX
     sides = [np.arange(margin, size - margin, SPACING_PX) for size in (grid.width, grid.height)]
-    centres = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    centres = mesh(*sides)
     if len(centres) <= most:
         return centres
     return centres[np.linspace(0, len(centres) - 1, most).round().astype(int)]

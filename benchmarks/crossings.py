@@ -20,6 +20,7 @@ from .attempt import Outcome, Pair, accepted, attempt, count
 from .cases import (
     REFERENCE_TRANSFORM,
     SAR_OPTICAL,
+    SAR_SAR,
     RealCase,
     draw_shift,
     image_size,
@@ -35,7 +36,7 @@ from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
 CROSSING = "another place"
 SPECKLE = {"reference": "reference is speckle", "input": "input is speckle"}
 
-SAR_REFERENCES = (SAR_OPTICAL, "sar-sar")
+SAR_REFERENCES = (SAR_OPTICAL, SAR_SAR)
 
 _AT_LEAST = 200
 _QUICK_STEP = 60

@@ -19,7 +19,7 @@ from groundtie.similarity.peak import find_peak
 from groundtie.similarity.surface import SimilaritySettings
 
 from .accuracy import FloatArray
-from .cases import SAR_OPTICAL, read_cases
+from .cases import SAR_OPTICAL, SAR_SAR, read_cases
 from .chips import OFFSETS_PX, RADIUS_PX, SPACING_PX, chip_centres
 from .offsets import OffsetPair, Scene, apply_matrix, open_offset
 from .simulations import Simulation
@@ -166,7 +166,7 @@ def share_within(surfaces: Surfaces, shifts: FloatArray) -> float:
 
 def run(settings: Settings) -> SuiteResult:
     """Run the suite."""
-    sar = [case for case in read_cases(settings.data) if case.kind in (SAR_OPTICAL, "sar-sar")]
+    sar = [case for case in read_cases(settings.data) if case.kind in (SAR_OPTICAL, SAR_SAR)]
     simulations = [Simulation(SIZE_PX, density, seed) for density, seed in SIMULATED]
     sources = [*sar[:2], *simulations[:1]] if settings.quick else [*sar, *simulations]
     shares = run_cases(

@@ -17,7 +17,7 @@ from affine import Affine
 from numpy.typing import NDArray
 from rasterio.crs import CRS
 
-from groundtie.rasters.grid import LON_LAT, Grid, reproject
+from groundtie.rasters.grid import LON_LAT, FloatArray, Grid, mesh, reproject
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.bias import Bias, fold
@@ -28,8 +28,6 @@ from groundtie.sensor.rpc_files import read_rpc
 from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
 
 from .cases import RealCase, read_cases, write_image
-
-FloatArray = NDArray[np.float64]
 
 PLACES = ("so-rosenheim", "so-dense-urban", "so-interchange", "so-fields")
 TRIPLET = "rpc-triplet/img_02.tif"
@@ -73,8 +71,7 @@ class SensorScene:
 
     def error_px(self, rpc: RPC) -> float:
         """Return the RMSE of RPCs over the whole image, in image pixels."""
-        cols, rows = np.meshgrid(*(np.linspace(0, side - 1, 15) for side in self.size))
-        px = np.column_stack([cols.ravel(), rows.ravel()])
+        px = mesh(*(np.linspace(0, side - 1, 15) for side in self.size))
         height = self.truth.offset[2]
         found = rpc.project(self.truth.localise(px, height), height)
         return float(np.sqrt(np.mean(((found - px) ** 2).sum(axis=1))))
@@ -97,6 +94,11 @@ def place_case(data: Path, name: str) -> RealCase:
     return next(case for case in read_cases(data) if case.name == name)
 
 
+def sensor_of(place: str, number: int) -> str:
+    """Return the source of the RPCs of a scene; sources alternate."""
+    return tuple(SENSORS)[(PLACES.index(place) + number) % len(SENSORS)]
+
+
 def sensor_rpc(data: Path, name: str) -> RPC:
     """Return the RPCs of a real image."""
     path = data / SENSORS[name]
@@ -106,9 +108,7 @@ def sensor_rpc(data: Path, name: str) -> RPC:
         return rpc_from_tags(dataset.tags(ns="RPC"), str(path))
 
 
-def make_scene(
-    case: RealCase, sensor: RPC, number: int, folder: Path, datum_error_m: float = 0.0
-) -> SensorScene:
+def make_scene(case: RealCase, sensor: RPC, number: int, folder: Path) -> SensorScene:
     """Make the files of one scene.
 
     Parameters
@@ -121,8 +121,6 @@ def make_scene(
         Number of the bias.
     folder
         Where the files are written.
-    datum_error_m
-        Height offset of the delivered terrain model.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with rasterio.open(case.reference) as dataset:
@@ -137,7 +135,7 @@ def make_scene(
     corner = np.round(centre + [-cols / 2 * pixel_m, rows / 2 * pixel_m])
     grid = Grid(Affine(pixel_m, 0, corner[0], 0, -pixel_m, corner[1]), crs, cols, rows)
     reference = write_image(sar, grid.transform, folder / "reference.tif", crs)
-    dem = _write_terrain(folder / "dem.tif", grid, height, 0.0)
+    dem = _write_terrain(folder / "dem.tif", grid, height)
     with open_raster(dem) as source:
         lon_lat = reproject(grid.pixel_to_map(grid.outline()), crs, LON_LAT)
         heights = terrain_heights(source, None, lon_lat)
@@ -154,8 +152,6 @@ def make_scene(
     image = write_image(bands, None, folder / "image.tif", None, nodata=0)
     with rasterio.open(image, "r+") as dataset:
         dataset.rpcs = rasterio.rpc.RPC.from_gdal(rpc_to_tags(delivered))
-    if datum_error_m:
-        dem = _write_terrain(folder / "wrong_dem.tif", grid, height, datum_error_m)
     return SensorScene(image, reference, dem, truth, delivered, size, case.sigma_px)
 
 
@@ -166,7 +162,7 @@ def _pixel_size_m(rpc: RPC) -> float:
     return float(np.sqrt(abs(np.linalg.det(np.array([right - centre, below - centre]) * metres))))
 
 
-def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> Path:
+def _write_terrain(path: Path, grid: Grid, height_m: float) -> Path:
     """Write hills around a height, over a grid with a margin."""
     reach = 3 * _RELIEF_M + 200.0
     left, top = grid.transform.c, grid.transform.f
@@ -176,7 +172,7 @@ def _write_terrain(path: Path, grid: Grid, height_m: float, offset_m: float) -> 
     noise = np.random.default_rng(5).normal(size=(rows, cols))
     hills = cv2.GaussianBlur(noise, (0, 0), 8.0)
     hills = _RELIEF_M / 2 * hills / np.abs(hills).max()
-    heights = (height_m + offset_m + hills).astype(np.float32)
+    heights = (height_m + hills).astype(np.float32)
     return write_image(heights[None], transform, path, grid.crs)
 
 
@@ -192,7 +188,7 @@ def _sensor_image(
     cols = np.arange(width, dtype=float)
     for top in range(0, height, 64):
         rows = np.arange(top, min(top + 64, height), dtype=float)
-        px = np.stack(np.meshgrid(cols, rows), axis=-1).reshape(-1, 2)
+        px = mesh(cols, rows)
         place = case.reference_to_input(grid.map_to_pixel(orientation.to_map(px)))
         inside = np.isfinite(place).all(axis=1)
         inside &= (place >= 0).all(axis=1) & (place <= np.array(optical.shape[:0:-1]) - 1).all(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from groundtie.pose.pose import Pose
+from groundtie.rasters.grid import mesh
 from groundtie.rasters.kernels import interpolate
 from groundtie.rasters.patch import Patch
 
@@ -102,7 +103,7 @@ def pose_errors(found: Pose, truth: Pose, shape: Sequence[int]) -> tuple[float, 
     """
     turned = abs((found.rotation_deg - truth.rotation_deg + 180) % 360 - 180)
     sides = [np.linspace(-0.5, 0.5, 21) * n for n in shape[::-1]]
-    px = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    px = mesh(*sides)
     shift = np.subtract(found.shift_px, truth.shift_px)
     off = px @ (found.linear - truth.linear).T + shift
     return turned, float(np.sqrt((off**2).sum(axis=1).mean())) / truth.scale

@@ -19,6 +19,7 @@ from groundtie.similarity import joint_histogram as counting
 from groundtie.similarity.description import BORDER_PX
 from groundtie.similarity.surface import SimilaritySettings, describe, similarity_surface
 
+from .processes import shortest_s
 from .suites import Settings, SuiteResult, Table
 
 _CHIPS_PX, _RADII_PX, _BINS = (40, 64, 80, 112), (9, 13, 25), (8, 12)
@@ -84,7 +85,8 @@ def _stack_costs(chip_px: int, radius_px: int, threads: int) -> dict[str, float]
 
         with ThreadPoolExecutor(threads) as executor:
             todo = range(threads * _STACKS)
-            seconds = _seconds(functools.partial(_map, executor, match, todo), time.perf_counter)
+            work = functools.partial(_map, executor, match, todo)
+            seconds = shortest_s(work, _TIMES, time.perf_counter)
         costs[f"{pixels} pixels"] = seconds / (len(todo) * count) * 1e3
     return costs
 
@@ -100,8 +102,8 @@ def _costs(chip_px: int, radius_px: int, bins: int) -> dict[str, float]:
     template, search = (random.integers(0, bins, (n, n)).astype(np.uint8) for n in (chip_px, side))
     sizes = (bins, bins)
     pixels, elements = span**2 * chip_px**2, bins**2 * side**2 * np.log2(side**2)
-    direct = _seconds(lambda: counting._count_directly(template, search, sizes, None))
-    spectral = _seconds(lambda: counting._count_spectrally(template, search, sizes, 1))
+    direct = shortest_s(lambda: counting._count_directly(template, search, sizes, None), _TIMES)
+    spectral = shortest_s(lambda: counting._count_spectrally(template, search, sizes, 1), _TIMES)
     return {
         "chip, px": chip_px,
         "shifts a side": span,
@@ -109,13 +111,3 @@ def _costs(chip_px: int, radius_px: int, bins: int) -> dict[str, float]:
         "directly": float(direct / pixels * 1e9),
         "spectrally": float(spectral / elements * 1e9),
     }
-
-
-def _seconds(work: Callable[[], object], clock: Callable[[], float] = time.thread_time) -> float:
-    """Return the shortest time for work, by default this thread's processor time."""
-    seconds = []
-    for _ in range(_TIMES):
-        started = clock()
-        work()
-        seconds.append(clock() - started)
-    return min(seconds)

@@ -5,7 +5,6 @@ The largest pair and its result take 15 GB of disk in the folder of temporary fi
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -13,13 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from groundtie.geometry.transform import Transform
-
 from .accuracy import CORRECT, REFUSED, classify
-from .attempt import Pair, on_pixels
+from .attempt import Pair
 from .large_pairs import large_pair, tile_pair
 from .processes import measure
-from .speed import own_command
+from .speed import own_command, own_error_px
 from .suites import Goal, Settings, SuiteResult, Table
 
 SIZES, QUICK_SIZES = (2000, 10_000, 30_000), (1000, 2000)
@@ -73,13 +70,8 @@ def run(settings: Settings) -> SuiteResult:
 def register(pair: Pair, size: int) -> Run:
     """Register a pair, judge the result, and measure the process."""
     found = measure(own_command(pair))
-    values = json.loads(found.output)
-    verdict, error = REFUSED, None
-    if values["verdict"]["accepted"]:
-        assert pair.truth is not None
-        transform = Transform.from_json(values["transform"])
-        error = pair.truth.error_px(on_pixels(transform, pair.reference))
-        verdict = classify(True, error, 0.0)
+    error = own_error_px(found.output, pair)
+    verdict = REFUSED if error is None else classify(True, error, 0.0)
     return Run(size, found.seconds, found.processor_seconds, found.peak_bytes, verdict, error)
 
 

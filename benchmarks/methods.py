@@ -10,7 +10,7 @@ import numpy as np
 from groundtie.similarity.surface import SIMILARITIES
 
 from .accuracy import CRASHED, REFUSED, VERDICTS
-from .cases import KINDS, SAR_OPTICAL, image_size, read_cases
+from .cases import KINDS, SAR_OPTICAL, SAR_SAR, image_size, read_cases
 from .chips import CHIPS_PX, LIMITS_PX, OFFSETS_PX, RADIUS_PX, SPACING_PX, ChipCase, ChipShare
 from .offsets import Scene
 from .programs import PROGRAMS, SHIFTS_PX, TIME_LIMIT_S, Registration, WholeCase
@@ -20,7 +20,7 @@ from .speed import NOT_INSTALLED, OWN
 from .suites import Goal, Settings, SuiteResult, Table, run_cases
 
 _DENSITIES = ("rural", "suburban")
-_SAR_KINDS = (SAR_OPTICAL, "sar-sar")
+_SAR_KINDS = (SAR_OPTICAL, SAR_SAR)
 _OTHER_KINDS = tuple(kind for kind in KINDS if kind not in _SAR_KINDS)
 _QUICK_KINDS = (SAR_OPTICAL, "optical-optical")
 
@@ -34,7 +34,7 @@ _GROUPS = {
 _PROGRAM_GROUPS = {
     "SAR–optical, real": (SAR_OPTICAL,),
     "SAR–optical, simulated": _DENSITIES,
-    "SAR–SAR": ("sar-sar",),
+    "SAR–SAR": (SAR_SAR,),
     "Optical, infrared, day and night": _OTHER_KINDS,
 }
 

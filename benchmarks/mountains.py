@@ -47,7 +47,8 @@ WITHOUT, WITH, NEEDLESS = "without heights", "with heights", "with needless heig
 LIT, ELSEWHERE = "to the terrain", "to another terrain"
 # An input with wrong heights, registered to the right terrain model.
 DISPLACED = "to the terrain, without heights"
-WAYS = (WITHOUT, WITH, NEEDLESS, LIT, ELSEWHERE, DISPLACED)
+_TO_TERRAIN = (LIT, ELSEWHERE, DISPLACED)
+WAYS = (WITHOUT, WITH, NEEDLESS, *_TO_TERRAIN)
 _WRONG_WAYS = (WITHOUT, WITH, DISPLACED)
 _LIT_PX = 1.0
 
@@ -66,7 +67,7 @@ class MountainCase:
         """Make the pair if needed, register it and judge the result."""
         pair = self._scene(self.seed)
         of = pair
-        if self.way in (LIT, ELSEWHERE, DISPLACED):
+        if self.way in _TO_TERRAIN:
             of = replace(pair, reference=pair.reference.with_name(NAMES["dem"]))
         if self.way == ELSEWHERE:
             dem = self._scene(self.seed + 1).reference.with_name(NAMES["dem"])
@@ -76,7 +77,7 @@ class MountainCase:
             group(self.country, self.view, self.way),
             of,
             workers,
-            tool="register" if of.reference != pair.reference else "coregister",
+            tool="register" if self.way in _TO_TERRAIN else "coregister",
             **further(pair, self.view, self.way),
         )
 
@@ -89,7 +90,7 @@ def further(pair: Pair, view: str, way: str) -> dict[str, Any]:
     dem = pair.reference.with_name(NAMES["dem"])
     if way == WITHOUT:
         return {}
-    if way in (LIT, ELSEWHERE, DISPLACED):
+    if way in _TO_TERRAIN:
         return {"views": f"terrain {RADAR if view == 'SAR' else SUN}"}
     return {"dem": dem, "input_dem": dem.with_name(NAMES["input_dem"]) if way == WITH else None}
 

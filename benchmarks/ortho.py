@@ -19,7 +19,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from rasterio.transform import RPCTransformer
 
 import groundtie
-from groundtie.rasters.grid import LON_LAT, reproject
+from groundtie.rasters.grid import LON_LAT, mesh, reproject
 from groundtie.rasters.reading import open_raster
 from groundtie.sensor.dense import DenseOrientation
 from groundtie.sensor.orientation import orient
@@ -172,8 +172,7 @@ def position_error_px(image: Path, dem: Path, like: Path) -> float:
         orientation = orient(source, rpc_of(source), grid.grid.crs, terrain)
         tile = grid.grid.window(grid.grid.width // 2, grid.grid.height // 2, _TILE, _TILE)
         own = DenseOrientation(orientation).coordinates(tile).reshape(2, -1).T
-    cols, rows = np.meshgrid(np.arange(_TILE), np.arange(_TILE))
-    xy = tile.pixel_to_map(np.column_stack([cols.ravel(), rows.ravel()]))
+    xy = tile.pixel_to_map(mesh(np.arange(_TILE), np.arange(_TILE)))
     x, y = np.ascontiguousarray(reproject(xy, tile.crs, LON_LAT).T)
     with rasterio.open(image) as dataset, RPCTransformer(dataset.rpcs, RPC_DEM=str(dem)) as exact:
         found = exact.rowcol(x, y, op=lambda value: value)

@@ -7,7 +7,8 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,6 +60,18 @@ def measure(command: Sequence[str]) -> Measured:
     if measured.exit_code not in (0, 3):
         raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr}")
     return measured
+
+
+def shortest_s(
+    work: Callable[[], object], times: int, clock: Callable[[], float] = time.thread_time
+) -> float:
+    """Return the shortest time for work; by default this thread's processor time."""
+    seconds = []
+    for _ in range(times):
+        started = clock()
+        work()
+        seconds.append(clock() - started)
+    return min(seconds)
 
 
 def measure_often(command: Sequence[str], times: int) -> Measured:

@@ -11,14 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from groundtie.geometry.transform import Transform
-
 from .accuracy import CRASHED, REFUSED, classify
-from .attempt import Pair, on_pixels
+from .attempt import Pair
 from .cases import search_radius_m
 from .offsets import Scene, apply_matrix, write_offset
 from .processes import measure
-from .speed import OWN, PEERS, own_command, peer_python
+from .speed import OWN, PEERS, own_command, own_error_px, peer_python
 
 # Initial error in columns and in rows; time limit of a program.
 SHIFTS_PX = (10.0, 20.0)
@@ -137,15 +135,6 @@ def command(program: Program | None, pair: Pair, threads: int) -> list[str] | No
     variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS")
     limits = [f"{variable}={threads}" for variable in variables]
     return ["env", *limits, "timeout", "--signal=KILL", f"{TIME_LIMIT_S:g}", *words]
-
-
-def own_error_px(output: str, pair: Pair) -> float | None:
-    """Return the error of the output of `groundtie coregister --json`; None if refused."""
-    values = json.loads(output)
-    if not values["verdict"]["accepted"]:
-        return None
-    assert pair.truth is not None
-    return pair.truth.error_px(on_pixels(Transform.from_json(values["transform"]), pair.reference))
 
 
 def error_px(output: str, pair: Pair) -> float | None:

@@ -19,7 +19,7 @@ from groundtie.simulation.sar import SarOptions, render_sar
 from groundtie.simulation.scene import SceneOptions, generate_scene
 from groundtie.speckle.statistics import estimate_looks, local_statistics
 
-from .cases import read_cases
+from .cases import SAR_SAR, read_cases
 from .suites import Settings, SuiteResult, Table, by_group
 
 SIZE_PX = 600
@@ -152,7 +152,7 @@ def real_images(data: Path) -> Iterator[Likeness]:
         for case, file in named.items():
             yield likeness(case, group, _middle_of(data / case / file))
     for pair in read_cases(data):
-        if pair.kind == "sar-sar":
+        if pair.kind == SAR_SAR:
             for path in (pair.reference, pair.input):
                 yield likeness(f"{pair.name}/{path.stem}", "real, country", _middle_of(path))
 

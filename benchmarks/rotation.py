@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -171,7 +171,7 @@ def side_for(image: Image, corners: str) -> int:
     return min(side, LONGEST_SIDE_PX)
 
 
-def search_all(settings: Settings, report: Callable[[str], None] = print) -> list[Found]:
+def search_all(settings: Settings) -> list[Found]:
     """Put poses between windows of all images, and search for them."""
     found = []
     for seed, (name, image) in enumerate(read_images(settings).items()):
@@ -192,7 +192,7 @@ def search_all(settings: Settings, report: Callable[[str], None] = print) -> lis
                             range_.limits,
                         )
                         found.append(one)
-        report(f"{name}: {len(found)} searches so far")
+        print(f"{name}: {len(found)} searches so far")
     return found
 
 

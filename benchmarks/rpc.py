@@ -17,7 +17,7 @@ from rasterio.crs import CRS
 from rasterio.errors import NotGeoreferencedWarning
 
 import groundtie
-from groundtie.rasters.grid import LON_LAT, reproject
+from groundtie.rasters.grid import LON_LAT, mesh, reproject
 from groundtie.sensor.bias import Bias, fold
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_files import read_rpc
@@ -25,7 +25,16 @@ from groundtie.sensor.rpc_tags import rpc_to_tags
 
 from .accuracy import CORRECT, CORRECT_PX, REFUSED, FloatArray, classify
 from .attempt import Outcome, count, tried
-from .half_real import BIASES, PLACES, SENSORS, bias_of, make_scene, place_case, sensor_rpc
+from .half_real import (
+    BIASES,
+    PLACES,
+    SENSORS,
+    bias_of,
+    make_scene,
+    place_case,
+    sensor_of,
+    sensor_rpc,
+)
 from .suites import Case, Goal, Settings, SuiteResult, by_group, run_cases
 from .tables import accuracy_table
 
@@ -62,19 +71,14 @@ class HalfRealCase:
     @property
     def name(self) -> str:
         """Place, sensor and number of the bias."""
-        return f"{self.place}, {self.sensor}, bias {self.number}"
-
-    @property
-    def sensor(self) -> str:
-        """Source of the real RPCs; sources alternate."""
-        return tuple(SENSORS)[(PLACES.index(self.place) + self.number) % len(SENSORS)]
+        return f"{self.place}, {sensor_of(self.place, self.number)}, bias {self.number}"
 
     def run(self, workers: int | None) -> Outcome:
         """Make the scene, refine its RPCs, and judge them by the true ones."""
         with tempfile.TemporaryDirectory() as folder:
             scene = make_scene(
                 place_case(self.data, self.place),
-                sensor_rpc(self.data, self.sensor),
+                sensor_rpc(self.data, sensor_of(self.place, self.number)),
                 self.number,
                 Path(folder),
             )
@@ -285,7 +289,7 @@ class RoundTripCase:
 
 def _distance_px(found: RPC, expected: RPC, truth: RPC) -> float:
     """Return the RMSE between two models of one image, pixels."""
-    nodes = np.stack(np.meshgrid(*(np.linspace(0, side, 15) for side in _SIZE)), -1).reshape(-1, 2)
+    nodes = mesh(*(np.linspace(0, side, 15) for side in _SIZE))
     ground = truth.localise(nodes, truth.offset[2])
     apart = found.project(ground, truth.offset[2]) - expected.project(ground, truth.offset[2])
     return float(np.sqrt((apart**2).sum(axis=1).mean()))

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import rasterio
 import rasterio.rpc
-from numpy.typing import NDArray
 from rasterio.transform import RPCTransformer
 
+from groundtie.rasters.grid import FloatArray
 from groundtie.sensor.rpc import RPC
 from groundtie.sensor.rpc_tags import rpc_to_tags
 
 from .half_real import sensor_rpc
-from .processes import measure
+from .processes import measure, shortest_s
 from .suites import Goal, Settings
 
 FORWARD, INVERSE = "1e6 points to the image", "1e6 points to the ground"
@@ -31,7 +31,6 @@ _POINTS = 1_000_000
 THREADS = 2
 PEERS = Path(__file__).parent / "peers"
 
-FloatArray = NDArray[np.float64]
 Timing = tuple[str, str, float, str]
 
 
@@ -79,12 +78,7 @@ def _in_threads(work: Callable[..., FloatArray], *points: FloatArray) -> list[Fl
 
 
 def _best(work: Callable[[], object], times: int) -> float:
-    seconds = []
-    for _ in range(times):
-        started = time.perf_counter()
-        work()
-        seconds.append(time.perf_counter() - started)
-    return min(seconds)
+    return shortest_s(work, times, time.perf_counter)
 
 
 def _miss(rpc: RPC, px: FloatArray, height: FloatArray) -> str:

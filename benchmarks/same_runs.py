@@ -29,6 +29,7 @@ from .accuracy import FloatArray, lattice
 from .cases import (
     KINDS,
     REFERENCE_TRANSFORM,
+    SAR_SAR,
     RealCase,
     draw_shift,
     image_size,
@@ -36,14 +37,13 @@ from .cases import (
     search_radius_m,
     write_case,
 )
-from .half_real import PLACES, SENSORS, make_scene, place_case, sensor_rpc
+from .half_real import PLACES, make_scene, place_case, sensor_of, sensor_rpc
 from .rotated_pairs import rotated_cases
 
 ACCEPTED, REFUSED, FAILED = "accepted", "refused", "failed"
 _VERDICTS = {0: ACCEPTED, 3: REFUSED}
 
 LARGEST_SHIFT_PX = 20.0
-SAR_SAR = "sar-sar"
 BIASES = (1, 2)
 
 _TRANSFORM, _RPC = "transform.json", "refined_RPC.TXT"
@@ -120,18 +120,15 @@ class RpcRefinement:
     number: int
 
     @property
-    def sensor(self) -> str:
-        """Source of the real RPCs; sources alternate."""
-        return tuple(SENSORS)[(PLACES.index(self.place) + self.number) % len(SENSORS)]
-
-    @property
     def name(self) -> str:
         """Tool, sensor, place and bias."""
-        return f"refine-rpc rpc-{self.sensor}, {self.place}, bias {self.number}"
+        return (
+            f"refine-rpc rpc-{sensor_of(self.place, self.number)}, {self.place}, bias {self.number}"
+        )
 
     def prepare(self, folder: Path) -> Prepared:
         """Make the scene."""
-        rpc = sensor_rpc(self.data, self.sensor)
+        rpc = sensor_rpc(self.data, sensor_of(self.place, self.number))
         scene = make_scene(place_case(self.data, self.place), rpc, self.number, folder)
         output = folder / _RPC
         words = ["refine-rpc", str(scene.image), str(output), "--reference", str(scene.reference)]

@@ -15,7 +15,7 @@ import groundtie
 from . import feature_counts
 from .accuracy import CORRECT, REFUSED
 from .attempt import Outcome, accepted, attempt, count
-from .cases import RealCase, read_cases
+from .cases import SAR_SAR, RealCase, read_cases
 from .crossings import Crossing, crossings
 from .real import SHIFTS, FreeCase, ShiftedCase
 from .sar_pairs import CHANGED_BUILDINGS, INCIDENCES_DEG, SarPair
@@ -23,7 +23,6 @@ from .suites import Case, Goal, Settings, SuiteResult, Table, by_group, none_wro
 from .tables import accuracy_table
 
 TOOL = "match_sar_sar"
-SAR_SAR = "sar-sar"
 
 # Cases whose images are rotated by 18°: they are also matched without georeferencing.
 _TURNED = ("ss-ponds", "ss-meander")

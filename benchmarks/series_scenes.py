@@ -25,8 +25,8 @@ _SHIFT_PX, _LINEAR_PX = 12.0, 0.5
 _SEASON, _NOISE = 0.25, 0.04
 _CLOUD_SHARE = 0.9
 
-# Margin of the ground beyond the dates.
-_MARGIN_PX = 40
+# Side of a date, and margin of the ground beyond it.
+_SIZE_PX, _MARGIN_PX = 560, 40
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,12 @@ class SimulatedSeries:
         increase to the right and to the lower border, (x, y) each, shape (n, 6).
     elsewhere, cloudy
         Dates that show another place, and dates that show clouds.
-    size_px
-        Side of a date.
     """
 
     files: tuple[Path, ...]
     displacement_px: FloatArray
     elsewhere: tuple[int, ...]
     cloudy: tuple[int, ...]
-    size_px: int
 
     @property
     def good(self) -> list[int]:
@@ -59,7 +56,7 @@ class SimulatedSeries:
 
 
 def simulate_series(
-    folder: Path, cache: Path, seed: int, count: int, bad: Sequence[int], size: int = 560
+    folder: Path, cache: Path, seed: int, count: int, bad: Sequence[int]
 ) -> SimulatedSeries:
     """Write a series; the first half of the `bad` dates show another place, the others clouds.
 
@@ -67,7 +64,7 @@ def simulate_series(
     """
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
-    ground, other = (_ground(cache, one, size) for one in (seed, seed + 50))
+    ground, other = (_ground(cache, one) for one in (seed, seed + 50))
     half = (len(bad) + 1) // 2
     elsewhere, cloudy = tuple(bad[:half]), tuple(bad[half:])
     moved = np.column_stack(
@@ -79,14 +76,14 @@ def simulate_series(
     moved[0] = 0.0
     files = []
     for date in range(count):
-        seen = _seen(other if date in elsewhere else ground, moved[date], size)
+        seen = _seen(other if date in elsewhere else ground, moved[date])
         image = aged(seen, rng)
         if date in cloudy:
             image = clouds_over(image, _CLOUD_SHARE, seed + date).over(image)
         values = np.clip(image * 200 + 20, 1, 255).astype(np.uint8)
         path = folder / f"date_{2001 + date}.tif"
         files.append(write_image(values[None], REFERENCE_TRANSFORM, path))
-    return SimulatedSeries(tuple(files), moved, elsewhere, cloudy, size)
+    return SimulatedSeries(tuple(files), moved, elsewhere, cloudy)
 
 
 def pairwise_px(displacements: FloatArray) -> FloatArray:
@@ -114,20 +111,20 @@ def aged(image: FloatArray, rng: np.random.Generator) -> np.ndarray:
     return np.asarray(seasonal + rng.normal(0, _NOISE, image.shape), np.float32)
 
 
-def _ground(cache: Path, seed: int, size: int) -> FloatArray:
+def _ground(cache: Path, seed: int) -> FloatArray:
     """Return a simulated optical scene, 0 to 1, larger than the dates."""
-    pair = Simulation(size + 2 * _MARGIN_PX, "suburban", seed).pair(cache)
+    pair = Simulation(_SIZE_PX + 2 * _MARGIN_PX, "suburban", seed).pair(cache)
     grey = read_image(pair.input).mean(axis=0)
     low, high = np.quantile(grey, (0.01, 0.99))
     return np.asarray(np.clip((grey - low) / (high - low), 0, 1), np.float64)
 
 
-def _seen(ground: FloatArray, displacement: FloatArray, size: int) -> FloatArray:
+def _seen(ground: FloatArray, displacement: FloatArray) -> FloatArray:
     """Return the image of a date whose georeferencing is wrong by a displacement."""
-    half = size / 2
-    rows, cols = np.mgrid[:size, :size].astype(float)
+    half = _SIZE_PX / 2
+    rows, cols = np.mgrid[:_SIZE_PX, :_SIZE_PX].astype(float)
     nominal = np.stack([cols, rows], axis=-1)
-    centre = (size - 1) / 2
+    centre = (_SIZE_PX - 1) / 2
     shift, linear = displacement[:2], displacement[2:].reshape(2, 2)
     # nominal = ground + shift + (ground − centre) / half · linear, solved for the ground.
     matrix = np.eye(2) + linear / half

@@ -48,7 +48,7 @@ from .attacks.scenes import Scene
 from .attacks.suite import sample
 from .cases import SAR_OPTICAL
 from .series_scenes import simulate_series
-from .suites import Goal, Settings, SuiteResult, Table, run_cases
+from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
 
 _QUICK, _SAMPLE = 4, 60
 BANDS_OF_ONE, BANDS_APART = "bands of one exposure", "bands, years apart"
@@ -298,8 +298,7 @@ def _is_explained(one: Measured) -> bool:
 
 
 def _by_group(some: list[Measured]) -> list[tuple[str, list[Sameness]]]:
-    groups = sorted({one.group for one in some})
-    return [(group, [one.sameness for one in some if one.group == group]) for group in groups]
+    return [(group, [one.sameness for one in own]) for group, own in sorted(by_group(some).items())]
 
 
 def _views_table(title: str, some: list[Measured]) -> Table:

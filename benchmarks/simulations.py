@@ -14,9 +14,10 @@ import numpy as np
 
 import groundtie
 from groundtie.memory import MOST_MB, VARIABLE
+from groundtie.rasters.grid import PointFunction
 from groundtie.simulation import files
 
-from .accuracy import FloatArray, Mapping, Truth
+from .accuracy import FloatArray, Truth
 from .attempt import Pair, on_pixels
 from .cases import image_size, read_check_points
 
@@ -113,7 +114,7 @@ def read_pair(folder: Path) -> Pair:
     return replace(exact, truth=Truth(points[:, :2], points[:, 2:], exact.truth.linear))
 
 
-def linear_of(mapping: Mapping, size: tuple[int, int]) -> FloatArray:
+def linear_of(mapping: PointFunction, size: tuple[int, int]) -> FloatArray:
     """Return input pixels per reference pixel around the centre, shape (2, 2)."""
     # Far enough that terrain, which bends the truth from pixel to pixel, hardly matters.
     step = min(size) / 4

@@ -6,12 +6,12 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -32,7 +32,8 @@ from groundtie.speckle.filters import FILTERS, SpeckleFilter
 
 from . import rpc_speed
 from .attempt import Pair, on_pixels
-from .processes import OUTPUT, Measured, measure, measure_often
+from .offsets import apply_matrix
+from .processes import OUTPUT, Measured, measure, measure_often, shortest_s
 from .simulations import Simulation
 from .suites import Goal, Settings, SuiteResult, Table
 
@@ -163,7 +164,7 @@ def time_affine(settings: Settings, times: int) -> list[Record]:
     """Time affine registrations of the same pair."""
     pair = simulated(settings, WINDOW_PX)
     files = [str(pair.reference), str(pair.input), OUTPUT]
-    commands = {"GroundTie": [*own_command(pair), "--model", "affine"]}
+    commands = {OWN: [*own_command(pair), "--model", "affine"]}
     for program, environment, script, more in (
         (SIMPLEITK_AFFINE, "simpleitk", "simpleitk_affine.py", []),
         (AROSICS_LOCAL, "arosics", "arosics_local.py", [str(_LARGEST_SHIFT_PX)]),
@@ -192,19 +193,25 @@ def record_of(what: str, program: str, measured: Measured, pair: Pair) -> Record
 
 def describe_found(program: str, output: str, pair: Pair) -> str:
     """Return in words the result in a program's JSON: its last line of output, or all of it."""
-    assert pair.truth is not None
     if program == OWN:
-        values = json.loads(output)
-        if not values["verdict"]["accepted"]:
-            return "refused"
-        transform = Transform.from_json(values["transform"])
-        return f"error {pair.truth.error_px(on_pixels(transform, pair.reference)):.2f} px"
+        error_px = own_error_px(output, pair)
+        return "refused" if error_px is None else f"error {error_px:.2f} px"
     found = json.loads(output.strip().splitlines()[-1])
     if program == AROSICS_LOCAL:
         return f"{found['tie_points']} tie points of {found['of']} kept"
+    assert pair.truth is not None
     matrix = np.array(found)
-    error = pair.truth.error_px(lambda px: px @ matrix[:, :2].T + matrix[:, 2])
-    return f"error {error:.2f} px"
+    error_px = pair.truth.error_px(lambda px: apply_matrix(matrix, px))
+    return f"error {error_px:.2f} px"
+
+
+def own_error_px(output: str, pair: Pair) -> float | None:
+    """Return the error of the output of `groundtie coregister --json`; None if refused."""
+    values = json.loads(output)
+    if not values["verdict"]["accepted"]:
+        return None
+    assert pair.truth is not None
+    return pair.truth.error_px(on_pixels(Transform.from_json(values["transform"]), pair.reference))
 
 
 def time_radar(times: int) -> list[Record]:
@@ -218,7 +225,9 @@ def time_radar(times: int) -> list[Record]:
     try:
         records = [
             Record(
-                f"{FILTER}{name}", OWN, _shortest(SpeckleFilter(name, 7, 1.0), times, image, valid)
+                f"{FILTER}{name}",
+                OWN,
+                shortest_s(partial(SpeckleFilter(name, 7, 1.0), image, valid), times),
             )
             for name in FILTERS
         ]
@@ -230,21 +239,11 @@ def time_radar(times: int) -> list[Record]:
             with rasterio.open(path, "w", width=RADAR_PX, height=RADAR_PX, **profile) as written:
                 written.write(np.sqrt(image), 1)
             with open_raster(path) as source:
-                seconds = _shortest(find_ground, times, Scene.of(source))
+                seconds = shortest_s(partial(find_ground, Scene.of(source)), times)
         records.append(Record(GROUND, OWN, seconds))
     finally:
         cv2.setNumThreads(threads)
     return records
-
-
-def _shortest(work: Callable[..., Any], times: int, *arguments: Any) -> float:
-    """Return the processor time for work in this thread alone, whatever else the machine does."""
-    seconds = []
-    for _ in range(times):
-        started = time.thread_time()
-        work(*arguments)
-        seconds.append(time.thread_time() - started)
-    return min(seconds)
 
 
 def radar_goals(records: Sequence[Record]) -> list[Goal]:

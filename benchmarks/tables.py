@@ -62,9 +62,9 @@ def goals_table(goals: Sequence[Goal]) -> Table:
     return Table("Goals", ("", "goal", "found", "reached"), rows)
 
 
-def to_markdown(table: Table, level: int = 3) -> str:
+def to_markdown(table: Table) -> str:
     """Return a table as Markdown; one without rows says so."""
-    heading = f"{'#' * level} {table.title}\n\n"
+    heading = f"### {table.title}\n\n"
     if not table.rows:
         return heading + "none\n"
     lines = [table.head, ["---"] * len(table.head), *table.rows]

@@ -15,7 +15,7 @@ from groundtie.arrays import Raster
 from groundtie.context import threads
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.judging import LARGEST_LOG10_CHANCE
-from groundtie.geometry.models import Frame, PolynomialModel
+from groundtie.geometry.models import shift_model
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.parts import ELSEWHERE_PX
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
@@ -185,7 +185,6 @@ def _surveyed(reference: FloatArray, input: FloatArray) -> Survey:
     ]
     with open_raster(rasters[0]) as one, open_raster(rasters[1]) as other, threads() as context:
         matcher = ChipMatcher(make_pair(PairImage(one), PairImage(other)), SimilaritySettings())
-        none = PolynomialModel("translation", Frame(Affine.identity()), np.zeros((1, 2)))
         places = survey_places(matcher.pair.grid)
-        images = matcher.resampled(none, places.grid, SURVEY_RADIUS_PX, context)
+        images = matcher.resampled(shift_model(0.0, 0.0), places.grid, SURVEY_RADIUS_PX, context)
         return survey_model(matcher, images, places, ELSEWHERE_PX, context)

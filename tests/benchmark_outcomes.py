@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.accuracy import CORRECT, CRASHED, REFUSED
-from benchmarks.attempt import Outcome, unregistered
+from benchmarks.attempt import Outcome, Try
 
 
 def outcome(verdict: str = CORRECT, error_px: float = 0.5, **more: Any) -> Outcome:
     """Return an outcome; what is not said is as for a good registration."""
     if verdict in (REFUSED, CRASHED):
         name, group = more.pop("name", "hills"), more.pop("group", "sar-optical")
-        return unregistered(verdict, name, group, 0.0, 1.0, "no points")
+        return Try(None, verdict, "no points", 1.0).unregistered(name, group, 0.0)
     values = {
         "name": "hills",
         "group": "sar-optical",

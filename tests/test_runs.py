@@ -23,6 +23,7 @@ from groundtie.rasters.atomic import Outputs, make_folder, write_json
 from groundtie.rasters.delivery import warp_raster
 from groundtie.rasters.reading import open_raster
 from groundtie.runs import file_facts, file_state, run_of_call, run_tags, running
+from groundtie.tools.coregister import coregister
 from groundtie.tools.warp import warp
 
 GRID = utm_grid(60, 50)
@@ -58,6 +59,24 @@ def test_another_parameter_or_another_input_has_another_id(call: Path) -> None:
     assert id_of(call, resampling="nearest") != first
     os.utime(call / "a.tif", (1, 1))
     assert id_of(call) != first
+
+
+def test_another_state_of_a_file_that_states_a_view_has_another_id(call: Path) -> None:
+    view = call / "item.json"
+    view.write_text("{}")
+    declared = tool_of(coregister)
+    checked = declared.check(
+        {
+            "reference": call / "a.tif",
+            "input": call / "b.tif",
+            "output": call / "out.tif",
+            "views": f"camera azimuth=250 incidence=12; {view}",
+        }
+    )
+    first = declared.run_of_call(checked)
+    assert declared.run_of_call(checked) == first
+    os.utime(view, (1, 1))
+    assert declared.run_of_call(checked) != first
 
 
 def test_with_an_array_each_call_has_an_id_of_its_own() -> None:

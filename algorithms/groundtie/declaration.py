@@ -21,7 +21,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 from .call_paths import check_different, check_paths
 from .errors import MemoryLimitError, ParameterError
-from .kinds import Kind, RasterIn, RastersIn, WrittenKind
+from .kinds import Kind, RasterIn, RastersIn, Views, WrittenKind
 from .memory import bounded_cache
 from .runs import run_of_call, running
 
@@ -140,7 +140,7 @@ class Tool:
     def run_of_call(self, checked: Mapping[str, Any]) -> str:
         """Return the id that all files of a call with these checked values carry (see `runs`)."""
         inputs = {
-            p.name: checked[p.name]
+            p.name: _with_files(p.kind, checked[p.name])
             for p in self.parameters
             if p.name not in _WHERE_IT_RUNS and not isinstance(p.kind, WrittenKind)
         }
@@ -233,6 +233,12 @@ def tool(
         return checked
 
     return decorate
+
+
+def _with_files(kind: Kind, value: Any) -> Any:
+    """Return a checked value; of views that files state, these files with it."""
+    files = kind.files_named(value) if isinstance(kind, Views) else ()
+    return (value, *files) if files else value
 
 
 def tool_of(function: Callable[..., Any]) -> Tool:

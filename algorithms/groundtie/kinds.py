@@ -12,15 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from .errors import GroundTieError, ParameterError
-from .raster_names import is_utf8, raster_name, require_possible
+from .raster_names import GEOTIFF, is_utf8, raster_name, require_possible
 from .stac_items import raster_of_item
 from .tables import plain_number
 
 # The choice, of a model or a mask as of anything else, that the data decide.
 AUTO = "auto"
-
-# Endings of a GeoTIFF.
-GEOTIFF = (".tif", ".tiff")
 
 # Endings of the files that state the view of an image: STAC items and products' metadata.
 VIEW_FILES = (".json", ".xml", ".imd")

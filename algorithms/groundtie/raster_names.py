@@ -49,12 +49,14 @@ _REMOTE = re.compile(
     r"/vsi(curl|s3|gs|az|adls|oss|swift|webhdfs|hdfs)(_streaming)?[/?]|\b(https?|ftp)://", re.I
 )
 
+# Suffixes of a GeoTIFF.
+GEOTIFF = (".tif", ".tiff")
+
 # Endings of RPC files beside a raster, in place of its suffix, in any case; GDAL takes the first.
 _RPC_ENDINGS = (".rpb", "_rpc.txt")
 
 # Suffixes of rasters that may have RPC files.
-_WITH_RPCS = (".tif", ".tiff", ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", ".til", ".vrt")
-
+_WITH_RPCS = (*GEOTIFF, ".ntf", ".nitf", ".jp2", ".j2k", ".img", ".pix", ".til", ".vrt")
 
 # Endings of files by which GDAL places a GeoTIFF without georeferencing, in place of its suffix and
 # in any case.
@@ -241,7 +243,7 @@ def own_world_files(path: Path) -> list[Path]:
 
     GDAL takes them for its georeferencing if it has none. Other paths have none.
     """
-    if path.suffix.lower() not in (".tif", ".tiff"):
+    if path.suffix.lower() not in GEOTIFF:
         return []
     if _suffixes_beside(path) - {*_WORLD_ENDINGS, *_WITHOUT_WORLD_FILES}:
         return []

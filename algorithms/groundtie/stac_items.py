@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from .errors import ParameterError
-from .raster_names import file_name, located
+from .raster_names import GEOTIFF, file_name, located
 from .strict_json import parse_json
 
 _DAY = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
@@ -36,7 +36,7 @@ _UNITS = ("year", "month", "day", "hour", "minute", "second")
 SUFFIXES = (".json", ".geojson")
 
 # Suffixes of files that are rasters, whatever type an item states.
-RASTER_SUFFIXES = (".tif", ".tiff", ".jp2", ".vrt", ".img")
+RASTER_SUFFIXES = (*GEOTIFF, ".jp2", ".vrt", ".img")
 
 # Timeout of a silent server.
 SILENT_SECONDS = 30

@@ -16,12 +16,12 @@ import numpy as np
 import groundtie
 
 from ..accuracy import CORRECT, SILENTLY_WRONG, classify
-from ..cases import SAR_OPTICAL
+from ..cases import SAR_OPTICAL, SAR_SAR
 from ..rotated_pairs import LARGEST_ERROR_PX
 from . import examples, ground, locked, noise, parts, placement, repetition
 from .catalogue import DRAWS, LOCKED, Attack, Setting
 from .pairs import Pair
-from .scenes import SAR_SAR, Scene, scenes
+from .scenes import Scene, scenes
 from .sensors import SensorCase, sensor_cases
 from .tries import AttackOutcome, attempted
 

@@ -94,8 +94,3 @@ def resampled(make: Make) -> Make:
         return other.on_another_grid(scale, corner)
 
     return made
-
-
-def as_text(shift_px: np.ndarray) -> str:
-    """Return a shift as text."""
-    return f"ground at ({shift_px[0]:+.1f}, {shift_px[1]:+.1f}) px"

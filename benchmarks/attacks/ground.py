@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..accuracy import FloatArray
-from ..cases import SAR_OPTICAL
+from ..cases import SAR_OPTICAL, SAR_SAR
 from ..series_scenes import aged
-from .catalogue import CONTROLS, GROUND, Attack, Make, Setting, as_text, direction, resampled
+from .catalogue import CONTROLS, GROUND, Attack, Make, Setting, direction, resampled
 from .effects import snow_cover
-from .overlays import Overlay, cloud_deck, smooth_noise
+from .overlays import Overlay, bump, cloud_deck, smooth_noise
 from .pairs import Change, Image, Pair, Source, to_bytes
-from .scenes import SAR_SAR, Scene
+from .scenes import Scene
 
 Shape = tuple[int, int]
 
@@ -89,10 +89,8 @@ def night(shape: Shape, rng: np.random.Generator) -> Change:
 
 def glint(shape: Shape, rng: np.random.Generator) -> Change:
     """Add sun glint with fine sparkle to a part of the image."""
-    rows, columns = np.indices(shape)
-    centre = rng.uniform(0.2, 0.8, 2) * shape
-    reach = rng.uniform(0.2, 0.45) * max(shape)
-    bright = np.exp(-((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2) / (2 * reach**2))
+    centre, reach = rng.uniform(0.2, 0.8, 2) * shape, rng.uniform(0.2, 0.45) * max(shape)
+    bright = bump(shape, centre, reach)
     sparkle = bright * rng.gamma(0.7, 1 / 0.7, shape)
     return lambda image: to_bytes(image * (1 - 0.5 * bright) + 160 * sparkle)
 
@@ -118,7 +116,7 @@ def changed(draw: Draw) -> Make:
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, 0.0, 20.0)
-        moved = pair.moved(shift, as_text(shift))
+        moved = pair.moved(shift)
         return moved.changed(None, draw(pair.input.shape[1:], setting.rng))
 
     return make
@@ -128,7 +126,7 @@ def moving_clouds(pair: Pair, setting: Setting) -> Pair:
     """Put the same clouds, moved by the wind, over ground that is displaced by another shift."""
     rng = setting.rng
     shift, wind = direction(rng, 0.0, 15.0), np.rint(direction(rng, 5.0, 20.0)).astype(int)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     deck = cloud_deck(pair.input.shape[1:], rng)
     note = f"clouds moved by ({wind[0]:+d}, {wind[1]:+d}) px"
     return moved.changed(deck.change(), deck.change(*(int(n) for n in wind)), note)
@@ -138,7 +136,7 @@ def water_moved(pair: Pair, setting: Setting) -> Pair:
     """Move a river or water area by another shift than the ground."""
     rng, shape = setting.rng, pair.input.shape[1:]
     shift, by = direction(rng, 0.0, 10.0), np.rint(direction(rng, 8.0, 20.0)).astype(int)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     noise = smooth_noise(shape, float(rng.uniform(18, 45)), rng)
     water = np.abs(noise) < rng.uniform(0.15, 0.5) if rng.random() < 0.5 else noise > 0.4
     grey = float(rng.choice([20, 45]))
@@ -162,7 +160,7 @@ def _sides_moved(pair: Pair, setting: Setting, top: Range, side: Range) -> Pair:
     """Scatter round objects by the ranges of the brightness of their tops and sides."""
     rng, shape = setting.rng, np.array(pair.reference.shape[1:])
     shift, apart = direction(rng, 0.0, 12.0), rng.uniform(9.0, 20.0)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     number = int(np.prod(shape) / apart**2)
     trunks, radii = rng.uniform(0, 1, (number, 2)) * shape[::-1], rng.uniform(1.3, 3.0, number)
     crown, shadow = rng.uniform(*top), rng.uniform(*side)
@@ -203,14 +201,14 @@ def two_dates(pair: Pair, setting: Setting) -> Pair:
     def on_a_date(image: Image) -> Image:
         return to_bytes(20 + 200 * aged(image[0] / 255.0, rng))[None]
 
-    return seen.moved(shift, as_text(shift)).changed(on_a_date, on_a_date)
+    return seen.moved(shift).changed(on_a_date, on_a_date)
 
 
 def self_copy(pair: Pair, setting: Setting) -> Pair:
     """Insert the reference as one band of the input; the other bands show displaced ground."""
     rng = setting.rng
     shift = direction(rng, 8.0, 25.0)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     bands = list(np.resize(moved.input, (2, *moved.input.shape[1:])))
     bands.insert(int(rng.integers(3)), moved.reference[0])
     return replace(moved, input=np.stack(bands))
@@ -222,7 +220,7 @@ def half_transparent_copy(is_resampled: bool) -> Make:
     def make(pair: Pair, setting: Setting) -> Pair:
         rng = setting.rng
         shift = direction(rng, 8.0, 25.0)
-        moved = pair.moved(shift, as_text(shift))
+        moved = pair.moved(shift)
         share, copy = rng.uniform(0.3, 0.7), pair.reference.mean(axis=0)
         if is_resampled:
             copy = ndimage.shift(copy, rng.uniform(-0.5, 0.5, 2), mode="mirror")
@@ -239,7 +237,7 @@ def filtered_stack(pair: Pair, setting: Setting) -> Pair:
     """
     rng = setting.rng
     shift = direction(rng, 5.0, 12.0)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     number, window = int(rng.integers(4, 13)), int(rng.choice([5, 7, 9, 11]))
     looks = rng.uniform(1.0, 4.0)
 
@@ -263,7 +261,7 @@ def alpha_band(pair: Pair, setting: Setting) -> Pair:
     """Append the same opacity band to both images; the ground is displaced."""
     rng, shape = setting.rng, pair.input.shape[1:]
     shift = direction(rng, 8.0, 25.0)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     opaque = to_bytes(255.0 * _area(shape, rng, 0.4, 0.8))[None]
     images = (np.concatenate([image, opaque]) for image in (moved.reference, moved.input))
     reference, image = images

@@ -11,9 +11,9 @@ from affine import Affine
 from groundtie.rasters.grid import apply_affine, compose
 
 from . import cartography, effects
-from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, as_text, direction, resampled
+from .catalogue import CONTROLS, LOCKED, Attack, Make, Setting, direction, resampled
 from .overlays import OVERLAYS, Draw
-from .pairs import Pair, pixels
+from .pairs import Pair, as_text, pixels
 
 _NEAREST_PX, _FARTHEST_PX = 8.0, 25.0
 
@@ -26,31 +26,31 @@ _OPPOSITE = 0.3
 
 def _moved(pair: Pair, setting: Setting) -> Pair:
     shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
-    return pair.moved(shift, as_text(shift))
+    return pair.moved(shift)
 
 
 def _elsewhere(pair: Pair, setting: Setting) -> Pair:
     return setting.elsewhere(pair)
 
 
-def displaced(draw: Draw) -> Make:
-    """The ground is displaced in the input; the locked content is not."""
-
-    def make(pair: Pair, setting: Setting) -> Pair:
-        moved = _moved(pair, setting)
-        return moved.both(draw(moved.reference.shape[1:], setting.rng).change())
-
-    return make
+def _in_place(pair: Pair, setting: Setting) -> Pair:
+    return pair
 
 
-def other_place(draw: Draw) -> Make:
-    """The input shows another place."""
+def alike(ground: Make) -> Callable[[Draw], Make]:
+    """The locked content is the same in both images, over ground that is changed or not."""
 
-    def make(pair: Pair, setting: Setting) -> Pair:
-        other = setting.elsewhere(pair)
-        return other.both(draw(other.reference.shape[1:], setting.rng).change())
+    def way(draw: Draw) -> Make:
+        def make(pair: Pair, setting: Setting) -> Pair:
+            seen = ground(pair, setting)
+            return seen.both(draw(seen.reference.shape[1:], setting.rng).change())
 
-    return make
+        return make
+
+    return way
+
+
+displaced, other_place, aligned = alike(_moved), alike(_elsewhere), alike(_in_place)
 
 
 def placed_right(draw: Draw) -> Make:
@@ -92,7 +92,7 @@ def at_an_offset(draw: Draw) -> Make:
         shift, other = direction(rng, 0.0, 20.0), np.rint(direction(rng, 1.0, 15.0))
         while np.hypot(*(shift - other)) < _NEAREST_PX:
             shift, other = direction(rng, 0.0, 20.0), np.rint(direction(rng, 1.0, 15.0))
-        moved = pair.moved(shift, as_text(shift))
+        moved = pair.moved(shift)
         drawn = draw(moved.reference.shape[1:], rng)
         right, down = (int(n) for n in other)
         note = f"overlay at ({right:+d}, {down:+d})"
@@ -148,7 +148,7 @@ def restyled(draw: Draw) -> Make:
     return make
 
 
-def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
+def wider(ground: Make) -> Callable[[Draw], Make]:
     """The overlay is a pixel or two wider in the input, whose ground does not match."""
 
     def way(draw: Draw) -> Make:
@@ -162,7 +162,7 @@ def wider(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
     return way
 
 
-def softer(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
+def softer(ground: Make) -> Callable[[Draw], Make]:
     """The locked content is blurred in both images; its contrast may be inverted in the input."""
 
     def way(draw: Draw) -> Make:
@@ -183,15 +183,6 @@ def softer(ground: Callable[[Pair, Setting], Pair]) -> Callable[[Draw], Make]:
 def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
     """The same attack with the input resampled to another pixel size."""
     return lambda draw: resampled(way(draw))
-
-
-def aligned(draw: Draw) -> Make:
-    """Ground and locked content both coincide, as in most products."""
-
-    def make(pair: Pair, setting: Setting) -> Pair:
-        return pair.both(draw(pair.reference.shape[1:], setting.rng).change())
-
-    return make
 
 
 _WAYS = {

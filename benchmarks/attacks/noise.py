@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from .catalogue import CITIES, CONTROLS, NOISE, Attack, Make, Setting, as_text, direction, resampled
+from .catalogue import CITIES, CONTROLS, NOISE, Attack, Make, Setting, direction, resampled
 from .effects import Effect, each_band, jpeg
 from .pairs import Change, Image, Pair, to_bytes
 from .scenes import Scene
@@ -70,8 +70,7 @@ def noisy(draw: Draw) -> Make:
     """Both images have independent noise; the ground is displaced by 0 to 20 px."""
 
     def make(pair: Pair, setting: Setting) -> Pair:
-        shift = direction(setting.rng, 0.0, 20.0)
-        moved = pair.moved(shift, as_text(shift))
+        moved = plain(pair, setting)
         changes = (draw(image, setting.rng) for image in (moved.reference, moved.input))
         return moved.changed(*changes)
 
@@ -102,7 +101,7 @@ def built_up(scene: Scene) -> bool:
 def plain(pair: Pair, setting: Setting) -> Pair:
     """The ground is displaced by up to 20 px."""
     shift = direction(setting.rng, 0.0, 20.0)
-    return pair.moved(shift, as_text(shift))
+    return pair.moved(shift)
 
 
 def untouched(pair: Pair, setting: Setting) -> Pair:

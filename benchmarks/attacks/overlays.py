@@ -121,6 +121,12 @@ def smooth_noise(shape: tuple[int, int], length_px: float, rng: np.random.Genera
     return np.asarray((noise - noise.mean()) / noise.std())
 
 
+def bump(shape: tuple[int, int], centre: FloatArray, reach: float) -> FloatArray:
+    """Return a bell of height 1 about a centre (row, column)."""
+    rows, columns = np.indices(shape)
+    return np.exp(-((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2) / (2 * reach**2))
+
+
 def _points(shape: tuple[int, int], number: int, rng: np.random.Generator) -> np.ndarray:
     return rng.uniform(-0.1, 1.1, (number, 2)) * np.array(shape[::-1])
 

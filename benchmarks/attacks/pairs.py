@@ -13,10 +13,9 @@ from affine import Affine
 from numpy.typing import NDArray
 
 import groundtie
-from groundtie.rasters.grid import Grid, compose
+from groundtie.rasters.grid import Grid, PointFunction, compose
 
 from ..accuracy import FloatArray, lattice
-from ..accuracy import Mapping as PixelMapping
 from ..cases import CRS, REFERENCE_TRANSFORM, write_image
 
 Image = NDArray[np.uint8]
@@ -46,7 +45,7 @@ class Source:
 
     reference: Image
     input: Image
-    to_input: PixelMapping
+    to_input: PointFunction
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ class Pair:
         """Columns and rows of the input."""
         return self.input.shape[2], self.input.shape[1]
 
-    def moved(self, shift_px: FloatArray, note: str = "") -> Pair:
+    def moved(self, shift_px: FloatArray, note: str | None = None) -> Pair:
         """Return the pair with the ground displaced in the input.
 
         Parameters
@@ -105,8 +104,9 @@ class Pair:
             Displacement (right, down) of each input pixel's ground from its nominal place,
             shape (2,) or (rows, columns, 2).
         note
-            Text to add to the note.
+            Text to add to the note; None: the shift, which is one for all pixels.
         """
+        note = as_text(shift_px) if note is None else note
         shown = pixels(self.size) - shift_px
         image, known = render(self.source, shown + np.array(self.corner))
         shown = np.where(known[..., None], shown, np.nan)
@@ -276,6 +276,11 @@ def render(source: Source, positions: FloatArray) -> tuple[Image, NDArray[np.boo
 def to_bytes(values: FloatArray) -> Image:
     """Return grey values as bytes, none of them nodata."""
     return np.clip(np.rint(values), 1, 255).astype(np.uint8)
+
+
+def as_text(shift_px: FloatArray) -> str:
+    """Return a shift of the ground as text."""
+    return f"ground at ({shift_px[0]:+.1f}, {shift_px[1]:+.1f}) px"
 
 
 def join(*notes: str) -> str:

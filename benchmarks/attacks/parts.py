@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..accuracy import FloatArray
 from .catalogue import PARTS, Attack, Make, Setting, direction
-from .overlays import smooth_noise
+from .overlays import bump, smooth_noise
 from .pairs import Pair, join
 
 # How far off parts lie, in pixels: within the radius of the survey, and beyond.
@@ -23,11 +23,16 @@ Shape = tuple[int, int]
 Part = Callable[[Shape, np.random.Generator], NDArray[np.bool_]]
 
 
+def _along(shape: Shape, angle: float) -> FloatArray:
+    """Return how far each pixel lies along a direction, in sides of the image."""
+    rows, columns = np.indices(shape)
+    return np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+
+
 def beyond_line(shape: Shape, share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
     """Return a share of an image's pixels that lies beyond a straight seam line."""
-    rows, columns = np.indices(shape)
     angle = rng.choice([0, 1, 2, 3]) * np.pi / 2 + rng.uniform(-0.5, 0.5) * rng.integers(0, 2)
-    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    along = _along(shape, angle)
     return np.asarray(along > np.quantile(along, 1 - share))
 
 
@@ -55,9 +60,7 @@ def corner(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
 
 def strip(shape: Shape, rng: np.random.Generator) -> NDArray[np.bool_]:
     """A strip across the image."""
-    rows, columns = np.indices(shape)
-    angle = rng.uniform(0, np.pi)
-    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    along = _along(shape, rng.uniform(0, np.pi))
     first = rng.uniform(0.1, 0.5)
     low, high = np.quantile(along, (first, first + rng.uniform(0.25, 0.4)))
     return np.asarray((along > low) & (along < high))
@@ -171,8 +174,7 @@ def bulge(pair: Pair, setting: Setting) -> Pair:
     """A hill displaces a part of the image, as if no terrain model had been used."""
     rng, shape = setting.rng, pair.input.shape[1:]
     centre, reach = rng.uniform(0.25, 0.75, 2) * shape, rng.uniform(0.15, 0.3) * max(shape)
-    rows, columns = np.indices(shape)
-    height = np.exp(-((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2) / (2 * reach**2))
+    height = bump(shape, centre, reach)
     off = direction(rng, 8.0, 18.0)
     return pair.moved(height[..., None] * off, f"hill by ({off[0]:+.1f}, {off[1]:+.1f}) px")
 
@@ -180,9 +182,8 @@ def bulge(pair: Pair, setting: Setting) -> Pair:
 def stretched(pair: Pair, setting: Setting) -> Pair:
     """A part is stretched, as by a wrong control point: farther off the farther from a seam."""
     rng, shape = setting.rng, pair.input.shape[1:]
-    rows, columns = np.indices(shape)
     angle, still = rng.uniform(0, 2 * np.pi), rng.uniform(0.4, 0.7)
-    along = np.cos(angle) * columns / shape[1] + np.sin(angle) * rows / shape[0]
+    along = _along(shape, angle)
     along = (along - along.min()) / np.ptp(along)
     growing = np.clip((along - still) / (1 - still), 0, 1)
     off = direction(rng, 10.0, 25.0)

@@ -10,7 +10,7 @@ from affine import Affine
 
 from groundtie.rasters.grid import compose
 
-from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, as_text, direction
+from .catalogue import CONTROLS, PLACEMENT, Attack, Make, Setting, direction
 from .pairs import Pair, join, to_bytes
 
 
@@ -32,7 +32,7 @@ def turned(pair: Pair, setting: Setting) -> Pair:
 def south_up(pair: Pair, setting: Setting) -> Pair:
     """The input's rows run northwards, as its geotransform states."""
     shift = direction(setting.rng, 0.0, 15.0)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     rows = moved.input.shape[1]
     place = compose(moved.input_transform, Affine.translation(0, rows), Affine.scale(1, -1))
     return replace(
@@ -44,7 +44,7 @@ def tiny_overlap(pair: Pair, setting: Setting) -> Pair:
     """The images share a strip of only 12 to 30 %, in which the ground is displaced."""
     rng = setting.rng
     shift, share = direction(rng, 0.0, 20.0), rng.uniform(0.12, 0.3)
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     columns = moved.input.shape[2]
     right, left = int(columns * (0.5 + share / 2)), int(columns * (0.5 - share / 2))
     return replace(
@@ -62,7 +62,7 @@ def claimed(draw: Callable[[np.random.Generator], tuple[Affine, str]]) -> Make:
 
     def make(pair: Pair, setting: Setting) -> Pair:
         shift = direction(setting.rng, 0.0, 12.0)
-        moved = pair.moved(shift, as_text(shift))
+        moved = pair.moved(shift)
         wrong, note = draw(setting.rng)
         centre = np.array(moved.size) / 2
         to, back = Affine.translation(*centre), Affine.translation(*-centre)
@@ -98,7 +98,7 @@ def other_zone(pair: Pair, setting: Setting) -> Pair:
 def unknown_units(pair: Pair, setting: Setting) -> Pair:
     """Neither image states a CRS, and the map units are 0.2 to 5 m."""
     shift, scale = direction(setting.rng, 0.0, 12.0), float(5 ** setting.rng.uniform(-1, 1))
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     return replace(
         moved,
         reference_transform=compose(Affine.scale(scale), moved.reference_transform),
@@ -112,7 +112,7 @@ def unknown_units(pair: Pair, setting: Setting) -> Pair:
 def far_off(pair: Pair, setting: Setting) -> Pair:
     """The ground is displaced by 30 to 60 px, beyond the search radius."""
     shift = direction(setting.rng, 30.0, 60.0)
-    return pair.moved(shift, as_text(shift)).within(float(setting.rng.uniform(8, 28)))
+    return pair.moved(shift).within(float(setting.rng.uniform(8, 28)))
 
 
 def other_place(pair: Pair, setting: Setting) -> Pair:
@@ -124,7 +124,7 @@ def bands_apart(pair: Pair, setting: Setting) -> Pair:
     """Two of three bands are displaced against the first, whose place counts."""
     rng = setting.rng
     shift, further = direction(rng, 0.0, 12.0), direction(rng, 5.0, 15.0)
-    stays, moves = pair.moved(shift, as_text(shift)), pair.moved(shift + further)
+    stays, moves = pair.moved(shift), pair.moved(shift + further)
     bands = [stays.input[:1], *(np.resize(moves.input, (2, *moves.input.shape[1:]))[:, None])]
     gains = 1.0, *rng.uniform(0.6, 1.0, 2)
     made = [to_bytes(gain * band) for gain, band in zip(gains, bands, strict=True)]

@@ -11,11 +11,10 @@ from affine import Affine
 from groundtie.rasters.grid import compose
 
 from ..accuracy import FloatArray
-from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL
-from .catalogue import REPETITION, Attack, Make, Setting, as_text, direction
+from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, SAR_SAR
+from .catalogue import REPETITION, Attack, Make, Setting, direction
 from .overlays import smooth_noise
 from .pairs import Change, Image, Pair, join, pixels, render, to_bytes
-from .scenes import SAR_SAR
 
 # Takes positions along and across the rows, in periods; returns the brightness, from 0 to 1.
 Pattern = Callable[[FloatArray, FloatArray], FloatArray]
@@ -69,7 +68,7 @@ def repeating(name: str) -> Make:
         rng = setting.rng
         shift = direction(rng, 5.0, 20.0)
         period, turn = rng.uniform(*_PERIODS[name]), rng.uniform(0, np.pi)
-        moved = pair.moved(shift, as_text(shift))
+        moved = pair.moved(shift)
         shape = pair.reference.shape[1:]
         cover = np.ones(shape)
         if rng.random() < 0.5:
@@ -117,7 +116,7 @@ def repeated_patch(pair: Pair, setting: Setting) -> Pair:
     """Repeat one piece of ground in both images, sometimes within a frame of other ground."""
     rng = setting.rng
     shift, side = direction(rng, 5.0, 20.0), int(rng.integers(24, 70))
-    moved = pair.moved(shift, as_text(shift))
+    moved = pair.moved(shift)
     shape = np.array(pair.reference.shape[:0:-1])
     first, frame = rng.integers(30, shape - side - 30), int(rng.choice([0, 0, 30]))
 
@@ -188,7 +187,7 @@ def fields(is_elsewhere: bool, is_far: bool = False) -> Make:
         low, high = (0.5 * quarter_px, 1.1 * quarter_px) if is_far else (0.0, 20.0)
         shift = direction(rng, low, high)
         place = compose(REFERENCE_TRANSFORM, Affine.scale(metres))
-        made = setting.elsewhere(pair) if is_elsewhere else pair.moved(shift, as_text(shift))
+        made = setting.elsewhere(pair) if is_elsewhere else pair.moved(shift)
         seeds = rng.integers(2**31, size=2)
         where = (pixels(pair.size), pixels(pair.size) if is_elsewhere else made.shown)
         radar = pair.kind in (SAR_OPTICAL, SAR_SAR), pair.kind == SAR_SAR

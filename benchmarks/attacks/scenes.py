@@ -18,12 +18,19 @@ from groundtie.rasters.grid import compose
 from groundtie.simulation import files
 
 from ..attempt import on_pixels
-from ..cases import REFERENCE_TRANSFORM, SAR_OPTICAL, RealCase, image_size, read_cases, read_image
+from ..cases import (
+    REFERENCE_TRANSFORM,
+    SAR_OPTICAL,
+    SAR_SAR,
+    RealCase,
+    image_size,
+    read_cases,
+    read_image,
+)
 from ..sar_pairs import SarPair
 from ..simulations import kept, simulator_version
 from .pairs import Image, Pair, Source, pixels, render, to_bytes
 
-SAR_SAR = "sar-sar"
 LARGE = "-large"
 DENSITIES = ("rural", "suburban", "urban", "city")
 

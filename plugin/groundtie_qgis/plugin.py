@@ -124,9 +124,8 @@ class GroundTiePlugin:
             QgsApplication.processingRegistry().removeProvider(self.provider)
             self.provider = None
 
-    def _add_action(self, text: str, does: Any) -> QAction:
+    def _add_action(self, text: str, does: Any) -> None:
         action = QAction(QIcon(str(ICON)), text, self._iface.mainWindow())
         action.triggered.connect(lambda *_: does())
         self._iface.addPluginToRasterMenu(MENU, action)
         self.actions.append(action)
-        return action

@@ -86,6 +86,9 @@ class SensorRun:
     def _first(self, percent: float) -> None:
         self._progress(_FIRST * percent)
 
+    def _second(self, percent: float) -> None:
+        self._progress(100 * _FIRST + (1 - _FIRST) * percent)
+
     def _refined(self, outcome: Outcome) -> None:
         if not outcome.succeeded:
             report = {k: path for k, path in outcome.files.items() if k == "REPORT"}
@@ -100,10 +103,7 @@ class SensorRun:
         }
         values = {**self._values, "REFERENCE": self._reference, "RPC": str(files["OUTPUT"])}
         ortho = {"OUTPUT": new_file("orthoimage.tif")}
-        self._run = Run(
-            *("orthorectify", values, ortho, ("OUTPUT",), self._projected),
-            lambda percent: self._progress(100 * _FIRST + (1 - _FIRST) * percent),
-        )
+        self._run = Run("orthorectify", values, ortho, ("OUTPUT",), self._projected, self._second)
         self._run.start()
 
     def _projected(self, outcome: Outcome) -> None:

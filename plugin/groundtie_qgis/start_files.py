@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsCoordinateReferenceSystem
+from qgis.PyQt import sip
 
 from .dependencies import missing_for
 
@@ -27,9 +28,14 @@ def without_options(source: str) -> str:
     return re.sub(r"\|(option|credential):[^|]*| authcfg='[^']+'", "", source)
 
 
+def is_file(layer: Any) -> bool:
+    """Whether a layer, which may be None or removed from the project, is a raster file."""
+    return layer is not None and not sip.isdeleted(layer) and layer.providerType() == "gdal"
+
+
 def has_rpcs(layer: Any) -> bool:
     """Whether a raster layer is located only by RPCs, with which GDAL warps it for QGIS."""
-    if layer is None or layer.providerType() != "gdal":
+    if not is_file(layer):
         return False
     dataset = opened(layer)
     if dataset is None or dataset.GetGeoTransform(can_return_null=True) is not None:

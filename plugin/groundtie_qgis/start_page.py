@@ -30,7 +30,7 @@ from .reference_export import MAP, with_files
 from .run import Outcome, Run, new_file
 from .search import usual_radius_m
 from .sensor_run import SensorImage, SensorRun
-from .start_files import has_rpcs, points_name
+from .start_files import has_rpcs, is_file, points_name
 from .translation import mark, tr
 from .tries import BandRows, Tries, have_bands
 from .verdict_label import VerdictLabel, first_lines
@@ -193,7 +193,7 @@ class StartPage(QWidget):
         tool = self.pair.currentData()
         values |= self.bands.values()
         if tool != "register":
-            values |= {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
+            values |= self._search_radius()
             values |= {"SEARCH_ROTATION": _ANY_ROTATION_DEG} if self.rotated.isChecked() else {}
         self._run = Run(tool, values, files, ("OUTPUT",), self._end, self._show_progress)
         self._run.start()
@@ -216,20 +216,20 @@ class StartPage(QWidget):
         """Refine the RPCs of an image against the reference, and orthorectify it."""
         reference = self.reference.currentLayer()
         self._layers = (reference, image)
-        if reference is None or reference.providerType() != "gdal":
+        if not is_file(reference):
             self._end(Outcome(False, tr("An image with RPCs needs a raster file as reference.")))
             return
         self.sensor = SensorImage(image, self.dem.currentLayer(), self.datum.currentData())
-        self._run = SensorRun(
-            *(self.sensor, reference.id(), self._control(reference), self._end),
-            self._show_progress,
-        )
+        control = self._control(reference)
+        self._run = SensorRun(self.sensor, reference.id(), control, self._end, self._show_progress)
         self._run.start()
 
     def _control(self, reference: Any) -> dict[str, Any]:
         """Return the source of ground control, which is matched in the reference."""
-        radius = {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
-        return {"REFERENCE": reference.id(), **radius}
+        return {"REFERENCE": reference.id(), **self._search_radius()}
+
+    def _search_radius(self) -> dict[str, float]:
+        return {"SEARCH_RADIUS": self.radius.value()} if self.radius.value() else {}
 
     def _from_map(self) -> bool:
         return bool(self.reference.currentText() == tr(MAP))

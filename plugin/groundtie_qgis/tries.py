@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from qgis.gui import QgsRasterBandComboBox
-from qgis.PyQt import sip
 from qgis.PyQt.QtWidgets import QFormLayout, QGridLayout, QPushButton, QSizePolicy, QWidget
 
+from .start_files import is_file
 from .translation import mark, tr
 
 _NAMES = (
@@ -69,12 +69,6 @@ class BandRows(QWidget):
         """Return the chosen bands, by parameter."""
         bands = {name: box.currentBand() for name, box in self.boxes.items()}
         return {name: band for name, band in bands.items() if band > 0}
-
-
-def is_file(layer: Any) -> bool:
-    """Return whether a layer of the project is a raster file, whose bands can be chosen."""
-    gone = layer is None or sip.isdeleted(layer)
-    return not gone and layer.providerType() == "gdal"
 
 
 def have_bands(layers: tuple[Any, ...]) -> bool:

@@ -181,7 +181,7 @@ def test_a_tenth_of_the_overlap_decides(pair: Pair, share: float, error: float) 
     off = np.where(np.arange(pair.size[0]) > (1 - share) * pair.size[0], 10.0, 0.0)
     shift = np.zeros((*pair.input.shape[1:], 2))
     shift[..., 0] = off
-    made = pair.moved(shift)
+    made = pair.moved(shift, "a part lies off")
     found, rmse = made.errors_px(transform_of(pair, 0, 0))
     assert found == pytest.approx(error, abs=1e-6)
     assert rmse == pytest.approx(10 * math.sqrt(share), rel=0.3)

@@ -11,7 +11,7 @@ from raster_files import utm_grid, write_raster
 
 from benchmarks import ortho, rpc, rpc_speed
 from benchmarks.accuracy import CORRECT, REFUSED
-from benchmarks.attempt import unregistered
+from benchmarks.attempt import Try
 from benchmarks.cases import RealCase
 from benchmarks.half_real import BIASES, LARGEST_SHIFT_PX, SENSORS, bias_of, make_scene, sensor_rpc
 from benchmarks.processes import Measured
@@ -62,7 +62,7 @@ def test_a_scene_shows_the_ground_where_its_true_rpcs_see_it(
 
 
 def outcome(verdict: str) -> rpc.Outcome:
-    return unregistered(verdict, "a", "b", 1.0, 0.0, "")
+    return Try(None, verdict, "", 0.0).unregistered("a", "b", 1.0)
 
 
 def test_goals_count_refusals_as_right_and_wrong_ones_as_wrong() -> None:

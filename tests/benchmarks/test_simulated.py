@@ -5,7 +5,7 @@ from pathlib import Path
 
 from benchmarks import simulated
 from benchmarks.accuracy import SILENTLY_WRONG
-from benchmarks.attempt import unregistered
+from benchmarks.attempt import Try
 from benchmarks.sar_pairs import SarPair
 from benchmarks.simulated import OPPOSITE, REBUILT_PERCENT, SimulatedCase, changes, rebuilt
 
@@ -23,6 +23,6 @@ def test_towns_and_cities_are_rebuilt_by_every_share(tmp_path: Path) -> None:
 
 
 def test_changes_are_reported_and_must_not_be_silently_wrong() -> None:
-    outcomes = [unregistered(SILENTLY_WRONG, "a", OPPOSITE, 0.0, 1.0, "accepted")]
+    outcomes = [Try(None, SILENTLY_WRONG, "accepted", 1.0).unregistered("a", OPPOSITE, 0.0)]
     goals = simulated.goals(OPPOSITE, outcomes)
     assert [goal.reached for goal in goals] == [None, None, False]

@@ -118,9 +118,8 @@ def matching_px(transform: Transform, reference: RasterSource | None) -> float:
     if reference is None:
         return 1.0
     grid = reference.grid
-    middle = (np.array(grid.size) - 1) / 2
-    to_input = transform.of_map(grid.crs)
-    first, right, down = to_input(grid.pixel_to_map(middle + [[0, 0], [1, 0], [0, 1]]))
+    pixels = np.add(grid.centre_px, [[0, 0], [1, 0], [0, 1]])
+    first, right, down = transform.of_map(grid.crs)(grid.pixel_to_map(pixels))
     sides = np.hypot(*np.subtract([right, down], first).T)
     # If the reference's centre has no position in the input, the input's pixels are taken.
     return float(sides[np.isfinite(sides)].max(initial=1.0))

@@ -101,7 +101,7 @@ class Transform:
         """
         model = self.model.affine if isinstance(self.model, TerrainModel) else self.model
         size = np.array(grid.size, float)
-        ends = (size - 1) / 2 + np.vstack([np.diag(-size), np.diag(size)]) / 2
+        ends = grid.centre_px + np.vstack([np.diag(-size), np.diag(size)]) / 2
         first, last = np.split(grid.map_to_pixel(model(grid.pixel_to_map(ends))), 2)
         return np.asarray(np.linalg.inv((last - first) / size[:, None]), np.float64)
 

@@ -22,7 +22,7 @@ from ..speckle.statistics import (
     local_statistics,
     window_counts,
 )
-from .radar import SAMPLE_PX, power
+from .radar import power
 from .scene import Scene, Selection
 
 # Side of areas, and the share of inhomogeneous windows from which on they have texture. Areas are
@@ -55,7 +55,7 @@ class OpenGround:
     @classmethod
     def of(cls, scene: Scene) -> OpenGround:
         """Return the open ground of a scene; its looks are estimated from a sample."""
-        patch = sample_of(scene.read, scene.grid, SAMPLE_PX)
+        patch = sample_of(scene.read, scene.grid)
         return cls(scene, estimate_looks(power(patch), patch.valid))
 
     def select(self, window: Window) -> Selection:

@@ -9,9 +9,6 @@ from ..rasters.patch import Patch, has_negative, sample_of
 from ..rasters.reading import FloatImage, Window
 from ..speckle.statistics import homogeneous_variation2
 
-# Side of the sample of an image, at full resolution: averaging would remove speckle.
-SAMPLE_PX = 1024
-
 # Least squared coefficient of variation of the power in the most homogeneous windows of a radar
 # image, and its least ratio to that of a camera image. Measured in pixels of a few metres: 0.09 to
 # 0.24, ratio 12 to 300; two radar images of one place: ratio 7 at most.
@@ -66,7 +63,7 @@ def _sample(image: Image, part: Window | None) -> Patch:
     def read(window: Window) -> Patch:
         return Patch(*source.read(window, image.band))
 
-    return sample_of(read, source.grid, SAMPLE_PX, part)
+    return sample_of(read, source.grid, part)
 
 
 def _states_decibels(image: Image) -> bool:

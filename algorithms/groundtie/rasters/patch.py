@@ -20,9 +20,9 @@ _EMPTY_PX = 9
 # Interpolating or averaging a constant changes it by a few units in the last place.
 _ROUNDING = 8 * float(np.finfo(np.float32).eps)
 
-# Least valid share of a sample, and the places along each side of an image where one is looked for:
-# 25 pieces of 1024 px are read in half a second.
-_SAMPLE_SHARE, _SAMPLES_ALONG = 0.5, 5
+# Side of a sample at full resolution, as averaging would remove speckle; its least valid share; and
+# the places along each side of an image where one is looked for: 25 are read in half a second.
+_SAMPLE_PX, _SAMPLE_SHARE, _SAMPLES_ALONG = 1024, 0.5, 5
 
 # A larger share of negative values is not due to resampling, whose kernels undershoot at edges.
 _NEGATIVE_SHARE = 0.02
@@ -129,9 +129,7 @@ def has_negative(known: FloatImage) -> bool:
     return bool(np.count_nonzero(known < 0) > _NEGATIVE_SHARE * known.size)
 
 
-def sample_of(
-    read: Callable[[Window], Patch], grid: Grid, side_px: int, part: Window | None = None
-) -> Patch:
+def sample_of(read: Callable[[Window], Patch], grid: Grid, part: Window | None = None) -> Patch:
     """Return a piece of an image that is mostly valid, from the middle of a part if that is.
 
     Parameters
@@ -140,13 +138,11 @@ def sample_of(
         Reads windows of the image.
     grid
         The image's pixels.
-    side_px
-        Longest side of the piece.
     part
         The part of the image whose content is asked for; None: all of it.
     """
     fullest = None
-    for window in _sample_windows(grid, side_px, part or Window(0, 0, *grid.size)):
+    for window in _sample_windows(grid, part or Window(0, 0, *grid.size)):
         patch = read(window)
         if patch.valid_share >= _SAMPLE_SHARE:
             return patch
@@ -156,9 +152,9 @@ def sample_of(
     return fullest
 
 
-def _sample_windows(grid: Grid, side_px: int, part: Window) -> list[Window]:
+def _sample_windows(grid: Grid, part: Window) -> list[Window]:
     """Return windows all over a part of a grid, those in its middle first."""
-    firsts, sides = [], [min(side, side_px) for side in grid.size]
+    firsts, sides = [], [min(side, _SAMPLE_PX) for side in grid.size]
     for start, length, side, whole in zip(part[:2], part[2:], sides, grid.size, strict=True):
         free = max(length - side, 0)
         low = start + (length - side - free) / 2

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..geometry.views import RADAR
+from ..geometry.views import RADAR, direction
 from .grid import Grid
 from .handles import read_by
 from .height_surfaces import read_heights
@@ -61,8 +60,8 @@ class Light:
         slant range and collects the echoes of all ground within it: the more, the more the slope
         faces the radar. Slopes facing away by more than the radar's elevation are in radar shadow.
         """
-        azimuth = math.radians(self.azimuth_deg)
-        away = -(east * np.float32(math.sin(azimuth)) + north * np.float32(math.cos(azimuth)))
+        to_east, to_north = map(np.float32, direction(self.azimuth_deg))
+        away = -(east * to_east + north * to_north)
         if self.kind == SUN:
             direct = np.maximum(1 + away, 0) / np.sqrt(1 + east**2 + north**2)
             return np.asarray(_AMBIENT + (1 - _AMBIENT) * direct, np.float32)

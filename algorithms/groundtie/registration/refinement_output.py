@@ -11,9 +11,14 @@ from typing import Any
 from ..assessment.comparison import Comparison
 from ..declaration import given_files
 from ..errors import OutputError, SameFileError
-from ..kinds import GEOTIFF
 from ..progress import Progress
-from ..raster_names import file_name, is_only_raster_of_its_name, is_rpc_file_of, rpc_files
+from ..raster_names import (
+    GEOTIFF,
+    file_name,
+    is_only_raster_of_its_name,
+    is_rpc_file_of,
+    rpc_files,
+)
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import write_with_geotransform
 from ..rasters.grid import FloatArray

@@ -19,11 +19,11 @@ from ..declaration import file_lines, given_files
 from ..errors import NotRegisteredError, ParameterError
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
-from ..kinds import GEOTIFF, Choice, FileOut, Number, RasterIn, RasterOut, WrittenKind
+from ..kinds import Choice, FileOut, Number, RasterIn, RasterOut, WrittenKind
 from ..masks.used import MaskUsed
 from ..matching.check import Check
 from ..matching.survey import Survey
-from ..raster_names import file_name, is_gdal_name
+from ..raster_names import GEOTIFF, file_name, is_gdal_name
 from ..rasters.atomic import Outputs
 from ..rasters.delivery import warp_to_array
 from ..rasters.pair import ImagePair

@@ -12,8 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from ..geometry.transform import Transform
-from ..kinds import GEOTIFF
-from ..raster_names import file_name
+from ..raster_names import GEOTIFF, file_name
 from ..rasters.grid import LON_LAT, Grid, epsg_of, near_longitude, reproject
 from ..rasters.reading import RasterSource
 from ..rasters.writing import COG_SUFFIXES

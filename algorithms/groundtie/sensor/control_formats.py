@@ -14,7 +14,7 @@ from rasterio.crs import CRS
 from ..errors import GroundTieError, TransformFileError
 from ..geometry.point_tables import require_places
 from ..geometry.tie_points import TiePoints
-from ..kinds import GEOTIFF
+from ..raster_names import GEOTIFF
 from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json

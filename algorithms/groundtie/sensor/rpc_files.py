@@ -130,7 +130,7 @@ def read_rpc(path: str | os.PathLike[str]) -> RPC:
     name = os.fspath(path)
     parse = _READERS.get(Path(name).suffix.lower())
     if parse is None:
-        raise GeoreferencingError(f"RPCs are read from {', '.join(_READERS)}: {name}")
+        raise GeoreferencingError(f"RPCs are read from {', '.join(READ_SUFFIXES)}: {name}")
     try:
         tags = parse(_text_of(name))
     except (OSError, UnicodeDecodeError, ElementTree.ParseError, ValueError) as error:
@@ -150,7 +150,7 @@ def write_rpc(path: str | os.PathLike[str], rpc: RPC) -> None:
     """
     write = _WRITERS.get(Path(path).suffix.lower())
     if write is None:
-        raise OutputError(f"RPCs are written as {', '.join(_WRITERS)}: {path}")
+        raise OutputError(f"RPCs are written as {', '.join(SUFFIXES)}: {path}")
     with writing(path):
         Path(path).write_text(write(rpc_to_tags(rpc)), encoding="utf-8", newline="\n")
 
@@ -256,3 +256,5 @@ _READERS: dict[str, Callable[[str], Tags]] = {
     ".xml": _read_dimap,
 }
 _WRITERS: dict[str, Callable[[Tags], str]] = {".txt": _write_text, ".rpb": _write_rpb}
+
+READ_SUFFIXES, SUFFIXES = tuple(_READERS), tuple(_WRITERS)

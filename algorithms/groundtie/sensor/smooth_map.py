@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..rasters.grid import FloatArray, PointFunction
+from ..rasters.grid import FloatArray, PointFunction, mesh
 from .polynomials import fill_terms, in_blocks
 
 _DEGREE = 5
@@ -44,7 +44,7 @@ def smooth_map(
         Largest error at random positions in the box, in the result's unit.
     """
     nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)  # Chebyshev's
-    unit = np.stack(np.meshgrid(nodes, nodes)).reshape(2, -1)
+    unit = mesh(nodes, nodes).T
     checks = np.random.default_rng(0).uniform(-1, 1, (2, _CHECKS))
     terms = np.empty((_TERMS, unit.shape[1]))
     fill_terms(unit, terms, _PRODUCTS)

@@ -26,6 +26,10 @@ PARAMETERS = 6
 # Samples of a move along each side of the square: a plane needs two; curvature averages out.
 _SAMPLES = 5
 
+# Mean squares of a displacement's terms over the frame: 1, u and v, which are uniform over ±1, with
+# a variance of 1/3, and independent.
+_OVER_FRAME = (1, 1 / 3, 1 / 3)
+
 # Smaller differences are due to rounding: of grids' corners, or of the linear part of a shift, at
 # the frame's border.
 ROUNDING_PX = 1e-6
@@ -147,8 +151,7 @@ class SeriesFrame:
 def rms_px(displacement: FloatArray) -> float:
     """Return the root mean square length of a displacement, (6,), over the frame."""
     squared = (displacement.reshape(3, 2) ** 2).sum(axis=1)
-    # u and v are uniform over ±1, with a variance of 1/3.
-    return float(np.sqrt(squared @ [1, 1 / 3, 1 / 3]))
+    return float(np.sqrt(squared @ _OVER_FRAME))
 
 
 def sigma_px(covariance: FloatArray) -> float:
@@ -158,9 +161,7 @@ def sigma_px(covariance: FloatArray) -> float:
 
 def _spread(covariance: FloatArray) -> FloatArray:
     """Return the mean covariance of positions over the frame, (2, 2), of a displacement's."""
-    # u and v are uniform over ±1, with a variance of 1/3, and independent.
-    over_frame = [1, 1 / 3, 1 / 3]
-    return np.asarray(np.einsum("iaib,i->ab", covariance.reshape(3, 2, 3, 2), over_frame))
+    return np.asarray(np.einsum("iaib,i->ab", covariance.reshape(3, 2, 3, 2), _OVER_FRAME))
 
 
 def _deviation(spread: FloatArray) -> float:

@@ -138,7 +138,7 @@ def adjust(
     is_free
         Whether the mean displacement of all dates is zero instead.
     """
-    kept = np.array([True] * len(links), bool)
+    kept = np.ones(len(links), bool)
     while True:
         kept &= _reached(links, kept, count, hub)
         network = _Network(frame, list(compress(links, kept)), count, hub)

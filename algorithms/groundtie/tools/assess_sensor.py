@@ -11,12 +11,14 @@ from ..assessment.sensor_accuracy import SensorErrors, draw_vectors, table_lines
 from ..declaration import Output, file_lines, given_files, tool
 from ..errors import TooFewPointsError
 from ..geometry.tie_points import NONE_HELD_OUT
-from ..kinds import GEOTIFF, FileIn, FileOut
+from ..kinds import FileIn, FileOut
 from ..progress import SILENT, Progress
+from ..raster_names import GEOTIFF
 from ..rasters.atomic import Outputs
 from ..registration.sensor_input import Ground, open_oriented_image, open_sensor_image
 from ..sensor.control_points import READ_SUFFIXES, left_out, read_control_points
 from ..sensor.rpc import RPC
+from ..sensor.rpc_files import READ_SUFFIXES as RPC_SUFFIXES
 from ..sensor.rpc_files import read_rpc
 from .parameters import general, sensor
 
@@ -85,7 +87,7 @@ def assess_sensor(
         FileIn(
             label="Refined RPCs",
             help="RPCs of refine_rpc: _RPC.TXT, .RPB, or an image (.tif) that has them.",
-            suffixes=(".txt", ".rpb", ".xml", *GEOTIFF),
+            suffixes=(*RPC_SUFFIXES, *GEOTIFF),
         ),
     ] = None,
     dem: sensor.Dem = None,

@@ -7,12 +7,14 @@ from typing import Annotated
 
 from ..declaration import NO_VALUES, Output, Values, tool
 from ..geometry.judging import USUAL_MAX_ERROR_PX
-from ..kinds import AUTO, GEOTIFF, Choice, FileIn, FileOut, RasterIn, VectorOut
+from ..kinds import AUTO, Choice, FileIn, FileOut, RasterIn, VectorOut
 from ..progress import SILENT, Progress
+from ..raster_names import GEOTIFF
 from ..registration.refinement import RefinedRpc
 from ..registration.sensor_jobs import refine
 from ..sensor.bias import KINDS
 from ..sensor.control_points import READ_SUFFIXES, SUFFIXES
+from ..sensor.rpc_files import SUFFIXES as RPC_SUFFIXES
 from .parameters import general, registration, sensor
 
 
@@ -33,7 +35,7 @@ def refine_rpc(
         FileOut(
             label="Refined RPCs",
             help="The RPCs alone, as _RPC.TXT or .RPB, or a copy of the image (.tif) with them.",
-            suffixes=(".txt", ".rpb", *GEOTIFF),
+            suffixes=(*RPC_SUFFIXES, *GEOTIFF),
         ),
     ],
     reference: Annotated[

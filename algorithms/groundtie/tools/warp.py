@@ -10,6 +10,7 @@ from ..context import threads
 from ..declaration import tool
 from ..errors import ParameterError
 from ..geometry.models import KINDS
+from ..geometry.tie_point_files import SUFFIXES
 from ..geometry.transform import Transform
 from ..kinds import Choice, FileIn
 from ..progress import SILENT, Progress
@@ -56,7 +57,7 @@ def warp(
             label="Transform or tie points",
             help="A transform (.json) or tie points (.gpkg, .geojson, .csv, or .points of the "
             "QGIS Georeferencer) of this raster or of another one of the same scene.",
-            suffixes=(".json", ".gpkg", ".geojson", ".csv", ".points"),
+            suffixes=(".json", *SUFFIXES),
             option=True,
         ),
     ],

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from ...kinds import Choice, Distance, FileIn, MaskIn, Number, RasterIn
 from ...sensor.geoids import DATUMS
+from ...sensor.rpc_files import READ_SUFFIXES
 from .general import MASK_HELP, MATCHED_BAND
 
 SensorImage = Annotated[
@@ -73,7 +74,7 @@ RpcFile = Annotated[
         label="RPC file",
         help="RPCs to use in place of the image's own: _RPC.TXT, .RPB or the RPC XML of DIMAP 2 "
         "and 3.",
-        suffixes=(".txt", ".rpb", ".xml"),
+        suffixes=READ_SUFFIXES,
         advanced=True,
     ),
 ]
