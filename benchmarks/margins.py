@@ -106,17 +106,13 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
-def _ground_of(sensors: Sensors) -> Callable[[RegistrationEvidence], float]:
+def _ground_of_cameras(evidence: RegistrationEvidence) -> float:
     """Return the height of a second place, as high, without what is dark or bright."""
-
-    def value(evidence: RegistrationEvidence) -> float:
-        surveys = evidence.surveys.ground
-        if not surveys or evidence.scene.sensors is not sensors:
-            return math.nan
-        rivals = (one for one in surveys if one.rival_height >= RIVAL_HEIGHT * one.height)
-        return max(map(deviations_elsewhere, rivals), default=0.0)
-
-    return value
+    surveys = evidence.surveys.ground
+    if not surveys or evidence.scene.sensors is not Sensors.CAMERAS:
+        return math.nan
+    rivals = (one for one in surveys if one.rival_height >= RIVAL_HEIGHT * one.height)
+    return max(map(deviations_elsewhere, rivals), default=0.0)
 
 
 def _rest_peak(evidence: RegistrationEvidence) -> float:
@@ -176,12 +172,7 @@ STATISTICS = (
     Statistic(
         "ground elsewhere: second place of cameras",
         EVEN_PEAK_DEVIATIONS,
-        _ground_of(Sensors.CAMERAS),
-    ),
-    Statistic(
-        "ground elsewhere: second place of both kinds",
-        REST_PEAK_DEVIATIONS,
-        _ground_of(Sensors.DIFFERENT),
+        _ground_of_cameras,
     ),
     Statistic("second place: peak", PEAK_DEVIATIONS, _of_survey(deviations_elsewhere)),
     Statistic("weak similarity: height", WEAK_HEIGHT, _of_survey(lambda s: s.height), False),

@@ -189,31 +189,6 @@ def test_shadows_and_roofs_do_not_hide_that_the_ground_lies_elsewhere(
         assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(expected, abs=1)
 
 
-@pytest.mark.parametrize("is_input_radar", [False, True])
-@pytest.mark.parametrize("moved", [(0, 0), (7, -5)])
-@pytest.mark.slow
-def test_bright_roofs_in_shadows_do_not_hide_that_the_ground_lies_elsewhere(
-    moved: tuple[int, int], is_input_radar: bool, tmp_path: Path, context: Context
-) -> None:
-    """What is bright in the radar image lies where the camera image has shadows."""
-    at = np.random.default_rng(0).uniform(size=(SIDE, SIDE)) < 1 / 50
-    spots = ndimage.binary_dilation(at, iterations=2)
-    images = [
-        0.3 * noisy(place(to), seed) + np.where(spots, contrast, 0.0)
-        for to, seed, contrast in (((0, 0), 1, 6.0), (moved, 2, -6.0))
-    ]
-    # The other way round the ground moves back.
-    expected = -np.array(moved) if is_input_radar else np.array(moved)
-    pair = images[::-1] if is_input_radar else images
-    kinds = ImageKinds(Sensors.DIFFERENT, is_input_radar)
-    surveys = surveys_of(tmp_path, pair[0], pair[1], context, kinds=kinds)
-    (without_spots,) = surveys.ground
-    assert surveys.whole is not None
-    for survey, shift in ((surveys.whole, (0, 0)), (without_spots, tuple(expected))):
-        top = np.unravel_index(np.argmax(survey.mean), survey.mean.shape)
-        assert np.subtract(top, SURVEY_RADIUS_PX)[::-1] == pytest.approx(shift, abs=1)
-
-
 # The most of a copy, over ground that is hardly moved, and the least, over ground far off.
 @pytest.mark.parametrize(("share", "moved"), [(0.6, (4, -3)), (0.35, (11, -7))])
 @pytest.mark.parametrize("offset", [(0, 0), (6, -4), (6.4, -3.7)])

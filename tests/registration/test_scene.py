@@ -58,9 +58,8 @@ def test_open_ground_is_looked_for_where_the_radar_image_shows_it(tmp_path: Path
         assert np.array_equal(ground(piece), info.reference.open_ground(piece))
     with opened(tmp_path, camera, radar) as pair:
         info = SceneInfo.of(pair, INPUT)
-        kinds, piece = info.kinds_by(model), pair.grid.window(90, 60, 70, 50)
-        ground = kinds.open_ground
-        assert ground is not None and kinds.is_input_radar
+        ground, piece = info.kinds_by(model).open_ground, pair.grid.window(90, 60, 70, 50)
+        assert ground is not None
         there = pair.grid.window(90 + moved[0], 60 + moved[1], 70, 50)
         assert 0.1 < ground(piece).mean() < 0.9
         assert np.array_equal(ground(piece), info.input.open_ground(there))

@@ -26,8 +26,6 @@ class ImageKinds:
     sensors
         Kinds of sensors that the images may come from; None: one is rendered from heights, and has
         no drawn content.
-    is_input_radar
-        Of a radar and a camera image, whether the input is the radar's.
     open_ground
         Returns which pixels of a radar image are not open ground, of two that of the reference;
         None: there is no radar image.
@@ -38,7 +36,6 @@ class ImageKinds:
     """
 
     sensors: Sensors | None
-    is_input_radar: bool = False
     open_ground: MaskOf | None = None
     is_masked: bool = False
     may_be_different: bool = False

@@ -65,8 +65,7 @@ class Surveys:
         one image is rendered, or in the geometry of its sensor.
     ground
         Of two radar images, of open ground, unless it alone takes part; of two camera images,
-        without dark pixels, and without bright ones; of both kinds, without the radar's bright and
-        the camera's dark pixels. Empty if one is rendered.
+        without dark pixels, and without bright ones. Else empty.
     fine
         With smaller chips, which show smaller parts; None: the others are as small.
     unexplained
@@ -148,8 +147,8 @@ def survey_all(
         if kinds.open_ground is not None and not kinds.is_masked:
             mask = kinds.open_ground
             ground = [survey_model(matcher, on_level, places, elsewhere_px, last, mask)]
-    elif sensors is not None:
-        ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, kinds, last)
+    elif sensors is Sensors.CAMERAS:
+        ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, last)
     return Surveys(whole, rest, ground, unexplained=unexplained, signs=signs, far=far)
 
 
@@ -158,25 +157,17 @@ def _survey_even_ground(
     images: Resampled,
     places: Places,
     elsewhere_px: float,
-    kinds: ImageKinds,
     context: Context,
 ) -> Sequence[Survey]:
-    """Survey a pair without what is dark or bright as shadows, roofs and walls are.
+    """Survey a camera pair without dark pixels, as shadows are, and without bright ones, as roofs.
 
-    Shadows fall, and roofs are displaced, to another side at another hour or from another view. In
-    a radar image roofs and walls are bright, where a camera's has shadows beside them. Parameters
-    as `survey_all` and `survey_model`.
+    Shadows fall, and roofs are displaced, to another side at another hour or from another view.
+    Parameters as `survey_all` and `survey_model`.
     """
-    ways: Sequence[PartOf]
-    if kinds.sensors is Sensors.CAMERAS:
-        ways = [
-            lambda one, other: (without_dark(one), without_dark(other)),
-            lambda one, other: (without_bright(one), without_bright(other)),
-        ]
-    elif kinds.is_input_radar:
-        ways = [lambda camera, radar: (without_dark(camera), without_bright(radar))]
-    else:
-        ways = [lambda radar, camera: (without_bright(radar), without_dark(camera))]
+    ways: Sequence[PartOf] = [
+        lambda one, other: (without_dark(one), without_dark(other)),
+        lambda one, other: (without_bright(one), without_bright(other)),
+    ]
     # Masks depend on the place, so descriptions cannot be reused.
     once = replace(context, memo=None)
 

@@ -223,12 +223,8 @@ class SceneInfo:
 
     def kinds_by(self, model: Model) -> ImageKinds:
         """Return what surveys of a model on the map need to know of the images."""
-        is_input_radar = self.sensors is Sensors.DIFFERENT and self.radar_name == INPUT
         return ImageKinds(
-            self.sensors,
-            is_input_radar,
-            self._open_ground_by(model),
-            may_be_different=self.may_be_different,
+            self.sensors, self._open_ground_by(model), may_be_different=self.may_be_different
         )
 
     def _open_ground_by(self, model: Model) -> MaskOf | None:

@@ -353,8 +353,7 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "ground elsewhere",
         "what is neither forest nor settlement in two radar images, or not dark or not bright in "
-        "two camera images, or neither bright in a radar nor dark in a camera image, as roofs and "
-        "cast shadows are, matches elsewhere about as well, and by "
+        "two camera images, as cast shadows and roofs are, matches elsewhere about as well, and by "
         f"{REST_PEAK_DEVIATIONS:g} robust standard deviations, of camera images "
         f"{EVEN_PEAK_DEVIATIONS:g}, better than usual",
         "suites calibration and margins",
