@@ -195,13 +195,13 @@ def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Reason, M
     found = [(Reason.HIDDEN, hidden)]
     if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
         towards_sun = _on_pixels(view.sun_azimuth_deg, grid)
-        sunlight = LineOfSight.from_vertical(towards_sun, 90 - view.sun_elevation_deg)
+        sunlight = LineOfSight(towards_sun, 90 - view.sun_elevation_deg)
         found.append((Reason.CAST_SHADOW, hidden_ground(heights, sunlight)))
     return found
 
 
 def _sight(view: View, grid: Grid) -> LineOfSight:
-    return LineOfSight.from_vertical(_on_pixels(view.azimuth_deg, grid), view.incidence_deg)
+    return LineOfSight(_on_pixels(view.azimuth_deg, grid), view.incidence_deg)
 
 
 def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:
