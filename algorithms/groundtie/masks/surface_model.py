@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import NoOverlapError
 from ..geometry.views import RADAR, View, direction
 from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, linear_part
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tiles
 from .object_heights import (
@@ -207,6 +207,5 @@ def _sight(view: View, grid: Grid) -> LineOfSight:
 def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:
     """Return the columns and rows of a grid for a metre of ground towards an azimuth."""
     units = np.matmul(direction(azimuth_deg), grid.east_north)
-    linear = np.array([[grid.transform.a, grid.transform.b], [grid.transform.d, grid.transform.e]])
-    cols, rows = np.linalg.solve(linear, units).tolist()
+    cols, rows = np.linalg.solve(linear_part(grid.transform), units).tolist()
     return cols, rows
