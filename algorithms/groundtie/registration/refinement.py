@@ -67,7 +67,7 @@ class RefinementEvidence:
     check: Control | None
     metres_per_px: float
     max_error_px: float
-    folding_px: float = 0.0
+    folding_px: float
     needs_spread: bool = True
     common: Common = NOTHING_COMMON
 
@@ -192,7 +192,7 @@ class RefinedRpc:
     verdict: Verdict
     heights: HeightCheck
     mask: MaskUsed | None
-    survey: Survey | None = None
+    survey: Survey | None
     files: Mapping[str, str] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
 
