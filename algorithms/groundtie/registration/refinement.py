@@ -28,7 +28,7 @@ from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.heights import ConstantHeight, Heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, hull_share
+from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, outside_hull
 from .ground_control import GroundControl
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge, judge_search
@@ -92,7 +92,7 @@ class RefinementEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the image outside of the hull of the control."""
-        return 1 - hull_share(self._used_px, self.control.size)
+        return outside_hull(self._used_px, self.control.size)
 
     @cached_property
     def held_out(self) -> Agreement:
