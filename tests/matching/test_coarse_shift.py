@@ -16,11 +16,7 @@ from groundtie.errors import RasterContentError
 from groundtie.geometry.limits import SearchLimits
 from groundtie.geometry.models import shift_model
 from groundtie.matching import coarse_shift
-from groundtie.matching.coarse_shift import (
-    Candidate,
-    coarse_candidates,
-    level_factor,
-)
+from groundtie.matching.coarse_shift import Candidate, coarse_candidates, level_factor
 from groundtie.matching.far_places import FarSearch
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.grid import Grid

@@ -7,12 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from raster_files import utm_grid
-from textured_pairs import (
-    TexturedPair,
-    error_m,
-    shift_on_map,
-    write_textured_pair,
-)
+from textured_pairs import TexturedPair, error_m, shift_on_map, write_textured_pair
 
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel

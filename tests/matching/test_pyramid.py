@@ -6,12 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from textured_pairs import (
-    TexturedPair,
-    error_m,
-    shift_on_map,
-    write_textured_pair,
-)
+from textured_pairs import TexturedPair, error_m, shift_on_map, write_textured_pair
 
 from groundtie.context import Context
 from groundtie.errors import CancelledError, NothingFoundError

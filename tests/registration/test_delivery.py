@@ -17,10 +17,7 @@ from groundtie.errors import NotRegisteredError, OutputError
 from groundtie.geometry.transform import load_transform
 from groundtie.registration import delivery
 from groundtie.registration.asked import specified
-from groundtie.registration.delivery import (
-    Call,
-    RegistrationFiles,
-)
+from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registered_output import RegisteredOutput
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import SAR_SAR

@@ -14,12 +14,7 @@ from evidences import LOST, refused
 from raster_files import write_raster
 from textured_pairs import TexturedPair, listing
 
-from groundtie.errors import (
-    NotRegisteredError,
-    OutputError,
-    ParameterError,
-    SameFileError,
-)
+from groundtie.errors import NotRegisteredError, OutputError, ParameterError, SameFileError
 from groundtie.matching.check import CHECK_RADIUS_PX, Check
 from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration

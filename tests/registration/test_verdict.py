@@ -26,13 +26,7 @@ from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.check import CHECK_RADIUS_PX
-from groundtie.registration.evidence import (
-    AGREEMENT,
-    ERROR,
-    SCENE,
-    SURVEY,
-    RegistrationEvidence,
-)
+from groundtie.registration.evidence import AGREEMENT, ERROR, SCENE, SURVEY, RegistrationEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.verdict import NOT_JUDGED, Verdict, judge, judge_search
 

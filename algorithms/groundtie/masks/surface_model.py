@@ -21,13 +21,7 @@ from ..progress import SILENT, Progress
 from ..rasters.grid import Grid, linear_part
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tiles
-from .object_heights import (
-    GROUND_REACH_M,
-    LOWEST_M,
-    FootprintModel,
-    SurfaceModel,
-    ground_cell_px,
-)
+from .object_heights import GROUND_REACH_M, LOWEST_M, FootprintModel, SurfaceModel, ground_cell_px
 from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, radar_echoes
 from .scene import Scene, Selection, write_tiles
 from .threshold import disc, grown
