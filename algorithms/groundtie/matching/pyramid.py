@@ -13,7 +13,7 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.held_images import held_on_level
 from .chips import ChipMatcher
-from .coarse_shift import SAME_PLACE_PX, Candidate, coarse_candidates, level_factor
+from .coarse_shift import SAME_PLACE_PX, Candidate, LevelSearch, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .pooled import PooledHistogramMatcher
 from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
@@ -67,7 +67,8 @@ def find_coarse_model(matcher: SurfaceMatcher, context: Context) -> Model:
     level = pair.grid.scaled(factor)
     if pair.limits.is_shift:  # others look at larger and smaller pixels, too
         pair = held_on_level(pair, level, context.quiet())
-    candidates = coarse_candidates(pair, level, matcher.settings, matcher.held_out, context)
+    search = LevelSearch(pair, level, matcher.settings, matcher.held_out, context)
+    candidates = search.candidates()
     context.update(0.3)
     if isinstance(matcher, PooledHistogramMatcher):
         return _descend_pooled(matcher, candidates, factor, context)
