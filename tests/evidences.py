@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from raster_files import UTM, utm_grid
 
+from groundtie.errors import NothingFoundError
 from groundtie.geometry.accuracy import NOTHING_COMMON, Common
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.fitting import fit_model
@@ -25,9 +26,10 @@ from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
 from groundtie.matching.surveys import Rest, Surveys
 from groundtie.registration.evidence import Evidence, RegistrationEvidence
 from groundtie.registration.refinement import RefinementEvidence
+from groundtie.registration.registration import Registration
 from groundtie.registration.scene import ImageFacts, SceneInfo
 from groundtie.registration.specification import BOTH, NEITHER
-from groundtie.registration.verdict import refusals
+from groundtie.registration.verdict import judge_search, refusals
 from groundtie.sensor.adjustment import Control, adjust
 from groundtie.similarity.in_common import Sameness
 
@@ -38,6 +40,14 @@ IMAGE_SIZE = (1000, 800)
 
 # Where heights displace things: along range, here off the axes of the map.
 RANGE = np.array([np.cos(0.3), np.sin(0.3)])
+
+# The verdict if nothing was found.
+LOST = judge_search(NothingFoundError("nothing in common was found"))
+
+
+def refused(registration: Registration) -> Registration:
+    """Return a registration as if nothing had been found."""
+    return replace(registration, evidence=None, check=None, verdict=LOST)
 
 
 def points(px: np.ndarray, error_px: np.ndarray, *, check: bool) -> TiePoints:

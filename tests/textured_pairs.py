@@ -132,6 +132,12 @@ def everywhere(grid: Grid, inset: int = 25) -> FloatArray:
     return grid.pixel_to_map(np.stack(np.meshgrid(cols, rows), -1).reshape(-1, 2))
 
 
+def error_m(model: Model, pair: TexturedPair) -> float:
+    """Return the root mean square error of a misregistration over the reference, in metres."""
+    xy = everywhere(pair.grid)
+    return rms(model(xy) - pair.truth.model(xy))
+
+
 def error_px(transform: Transform, pair: TexturedPair) -> float:
     """Return the root mean square error of a transform over the reference, in input pixels."""
     xy = everywhere(pair.grid)

@@ -49,7 +49,7 @@ def length_m(mask: np.ndarray, side: str) -> float:
 def test_a_box_hides_its_height_times_the_tangent_away_from_the_sensor(
     side: str, angle_deg: float
 ) -> None:
-    hidden = hidden_ground(box(), LineOfSight.from_vertical(towards(side), angle_deg))
+    hidden = hidden_ground(box(), LineOfSight(towards(side), angle_deg))
     expected_m = HEIGHT_M * math.tan(math.radians(angle_deg))
     assert length_m(hidden, side) == pytest.approx(expected_m, abs=PIXEL_M)
     col, row = SIDES[side]
@@ -61,7 +61,7 @@ def test_a_box_hides_its_height_times_the_tangent_away_from_the_sensor(
 def test_a_box_is_laid_over_its_height_by_the_tangent_towards_the_radar(
     side: str, incidence_deg: float
 ) -> None:
-    echoes = radar_echoes(box(), LineOfSight.from_vertical(towards(side), incidence_deg))
+    echoes = radar_echoes(box(), LineOfSight(towards(side), incidence_deg))
     expected_m = HEIGHT_M / math.tan(math.radians(incidence_deg))
     assert length_m(echoes > 0, side) == pytest.approx(expected_m, abs=PIXEL_M)
     col, row = SIDES[side]
@@ -70,7 +70,7 @@ def test_a_box_is_laid_over_its_height_by_the_tangent_towards_the_radar(
 
 
 def test_the_sun_casts_shadows_of_height_by_the_tangent_of_its_elevation() -> None:
-    sunlight = LineOfSight.from_vertical(towards("up"), 90 - 40.0)
+    sunlight = LineOfSight(towards("up"), 90 - 40.0)
     shaded = hidden_ground(box(), sunlight)
     assert length_m(shaded, "up") == pytest.approx(
         HEIGHT_M / math.tan(math.radians(40)), abs=PIXEL_M
@@ -82,9 +82,7 @@ def test_an_oblique_azimuth_hides_as_long_a_strip() -> None:
     step = math.sin(azimuth) / PIXEL_M, -math.cos(azimuth) / PIXEL_M
     surface = np.zeros(SHAPE, np.float32)
     surface[139:142, 139:142] = HEIGHT_M
-    hidden = hidden_ground(
-        Heights(surface, np.zeros_like(surface)), LineOfSight.from_vertical(step, 45.0)
-    )
+    hidden = hidden_ground(Heights(surface, np.zeros_like(surface)), LineOfSight(step, 45.0))
     rows, cols = np.nonzero(hidden)
     far = np.hypot(rows - 140, cols - 140).argmax()
     away_m = np.array([cols[far] - 140, rows[far] - 140]) * PIXEL_M
@@ -94,7 +92,7 @@ def test_an_oblique_azimuth_hides_as_long_a_strip() -> None:
 
 def test_ground_that_rises_away_from_the_sensor_is_hidden_less() -> None:
     slope, angle = 0.2, math.radians(35)
-    hidden = hidden_ground(box(slope), LineOfSight.from_vertical(towards("left"), 35.0))
+    hidden = hidden_ground(box(slope), LineOfSight(towards("left"), 35.0))
     # The roof's far edge is as much higher as the ground there.
     expected_m = HEIGHT_M / (1 / math.tan(angle) + slope)
     assert length_m(hidden, "left") == pytest.approx(expected_m, abs=PIXEL_M)
@@ -102,16 +100,16 @@ def test_ground_that_rises_away_from_the_sensor_is_hidden_less() -> None:
 
 def test_a_slope_towards_the_radar_lengthens_what_is_laid_over_it() -> None:
     slope, lean = 0.2, 1 / math.tan(math.radians(35))
-    echoes = radar_echoes(box(slope), LineOfSight.from_vertical(towards("left"), 35.0))
+    echoes = radar_echoes(box(slope), LineOfSight(towards("left"), 35.0))
     # Ground x and roof 0 have one range: x − slope·x·lean = −(height)·lean.
     expected_m = HEIGHT_M * lean / (1 - slope * lean)
     assert length_m(echoes > 0, "left") == pytest.approx(expected_m, abs=2 * PIXEL_M)
 
 
 def test_nothing_is_hidden_from_the_zenith_nor_on_bare_ground() -> None:
-    assert not hidden_ground(box(), LineOfSight.from_vertical((1.0, 0.0), 0.0)).any()
+    assert not hidden_ground(box(), LineOfSight((1.0, 0.0), 0.0)).any()
     ground = box(0.1).ground_m
-    bare, sight = Heights(ground, ground), LineOfSight.from_vertical(towards("left"), 40.0)
+    bare, sight = Heights(ground, ground), LineOfSight(towards("left"), 40.0)
     assert not hidden_ground(bare, sight).any() and not radar_echoes(bare, sight).any()
 
 
@@ -129,12 +127,12 @@ def test_double_bounce_lies_at_the_feet_of_walls_that_face_the_radar(
 ) -> None:
     expected = np.zeros(SHAPE)
     expected[place] = HEIGHT_M / PIXEL_M
-    found = double_bounce(box(), LineOfSight.from_vertical(towards(side), 40.0))
+    found = double_bounce(box(), LineOfSight(towards(side), 40.0))
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 def test_double_bounce_needs_a_wall_and_ground_that_the_radar_sees() -> None:
-    sight = LineOfSight.from_vertical(towards("left"), 45.0)
+    sight = LineOfSight(towards("left"), 45.0)
     ground = box(0.3).ground_m
     assert not double_bounce(Heights(ground, ground), sight).any()
     behind, alone = box(), double_bounce(box(), sight)
@@ -149,5 +147,5 @@ def test_double_bounce_needs_a_wall_and_ground_that_the_radar_sees() -> None:
 def test_what_the_radar_does_not_see_is_laid_over_nothing() -> None:
     heights = box()
     heights.surface_m[ROWS, 161:170] = 3.0  # in the box's radar shadow
-    sight = LineOfSight.from_vertical(towards("left"), 45.0)
+    sight = LineOfSight(towards("left"), 45.0)
     np.testing.assert_array_equal(radar_echoes(heights, sight), radar_echoes(box(), sight))

@@ -4,25 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from masks.scenes import scene_of
 from masks.town import Town, draw_town
-from raster_files import utm_grid, write_raster
 from scipy.ndimage import distance_transform_edt
 
 from groundtie.errors import RasterContentError
 from groundtie.masks import reduced
 from groundtie.masks.regions import GroundRegions, find_regions
-from groundtie.masks.scene import Scene
-from groundtie.rasters.reading import Window, open_raster
+from groundtie.rasters.reading import Window
 
 
 @pytest.fixture(scope="module")
 def town() -> Town:
     return draw_town()
-
-
-def scene_of(path: Path, image: np.ndarray, **more: object) -> Scene:
-    write_raster(path, image, utm_grid(image.shape[1], image.shape[0], 1.0), **more)
-    return Scene.of(open_raster(path))
 
 
 @pytest.fixture(scope="module")

@@ -16,12 +16,7 @@ from rasterio.crs import CRS
 
 from groundtie.errors import NoOverlapError, VectorLayerError
 from groundtie.geometry.views import View
-from groundtie.masks.object_heights import (
-    FootprintModel,
-    RasterModel,
-    bare_ground,
-    read_footprints,
-)
+from groundtie.masks.object_heights import FootprintModel, RasterModel, bare_ground, read_footprints
 from groundtie.masks.scene import Scene
 from groundtie.masks.surface_model import Reason, SurfaceGround
 from groundtie.rasters.grid import Grid, compose

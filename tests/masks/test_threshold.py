@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import rasterio
 from affine import Affine
-from raster_files import utm_grid, write_raster
+from masks.scenes import scene_of
+from raster_files import write_raster
 from scipy.ndimage import distance_transform_edt
 
 from groundtie.errors import ParameterError, RasterContentError
@@ -25,11 +26,6 @@ def block_means(image: np.ndarray) -> np.ndarray:
 @pytest.fixture
 def image() -> np.ndarray:
     return np.random.default_rng(0).gamma(2, 50, (120, 160)).astype(np.float32)
-
-
-def scene_of(path: Path, image: np.ndarray, **more: object) -> Scene:
-    write_raster(path, image, utm_grid(image.shape[1], image.shape[0], 1.0), **more)
-    return Scene.of(open_raster(path))
 
 
 @pytest.mark.parametrize(("high", "low"), [(20, 0), (0, 10), (35, 15)])

@@ -4,16 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from raster_files import utm_grid, write_raster
+from masks.scenes import scene_of
 
-from groundtie.masks.scene import Scene
 from groundtie.masks.town import PERHAPS_TOWN_SHARE, share_of_strong_scatterers
 from groundtie.rasters.kernels import interpolate
-from groundtie.rasters.reading import open_raster
-
-
-def scene_of(path: Path, image: np.ndarray) -> Scene:
-    return Scene.of(open_raster(write_raster(path, image, utm_grid(*image.shape[::-1], 1.0))))
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3])

@@ -16,11 +16,7 @@ from groundtie.errors import RasterContentError
 from groundtie.geometry.limits import SearchLimits
 from groundtie.geometry.models import shift_model
 from groundtie.matching import coarse_shift
-from groundtie.matching.coarse_shift import (
-    Candidate,
-    coarse_candidates,
-    level_factor,
-)
+from groundtie.matching.coarse_shift import Candidate, LevelSearch, level_factor
 from groundtie.matching.far_places import FarSearch
 from groundtie.pose.pose import Pose, PoseFound
 from groundtie.rasters.grid import Grid
@@ -34,7 +30,8 @@ SETTINGS = SimilaritySettings("orientation")
 def candidates(
     pair: ImagePair, level: Grid, limits: SearchLimits, context: Context
 ) -> list[Candidate]:
-    return coarse_candidates(replace(pair, limits=limits), level, SETTINGS, None, context)
+    search = LevelSearch(replace(pair, limits=limits), level, SETTINGS, None, context)
+    return search.candidates()
 
 
 def shift_m(candidate: Candidate) -> tuple[float, ...]:

@@ -7,13 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from raster_files import utm_grid
-from textured_pairs import (
-    TexturedPair,
-    everywhere,
-    rms,
-    shift_on_map,
-    write_textured_pair,
-)
+from textured_pairs import TexturedPair, error_m, shift_on_map, write_textured_pair
 
 from groundtie.context import Context
 from groundtie.geometry.models import Frame, Model, PolynomialModel
@@ -30,11 +24,6 @@ SETTINGS = SimilaritySettings("orientation")
 
 def fitted(pair: ImagePair, start: Model, context: Context) -> CoarseModel:
     return fit_level(ChipMatcher(pair, SETTINGS), pair.grid, start, 12, context)
-
-
-def error_m(model: Model, files: TexturedPair) -> float:
-    xy = everywhere(files.grid)
-    return rms(model(xy) - files.truth.model(xy))
 
 
 def similarity(shift: tuple[float, float], degrees: float, growth: float = 1.0) -> Model:

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from raster_files import utm_grid
 
-from groundtie.matching.parts import (
-    LEAST_EXCESS,
-    find_parts,
-    largest_group,
-)
+from groundtie.matching.parts import LEAST_EXCESS, find_parts, largest_group
 
 RADIUS = 24
 COLS, ROWS = 7, 6

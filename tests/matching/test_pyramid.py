@@ -6,13 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from textured_pairs import (
-    TexturedPair,
-    everywhere,
-    rms,
-    shift_on_map,
-    write_textured_pair,
-)
+from textured_pairs import TexturedPair, error_m, shift_on_map, write_textured_pair
 
 from groundtie.context import Context
 from groundtie.errors import CancelledError, NothingFoundError
@@ -30,11 +24,6 @@ def coarse_model(pair: ImagePair, radius_m: float, context: Context) -> Model:
     pair = replace(pair, limits=SearchLimits(radius_m))
     matcher = ChipMatcher(pair, SimilaritySettings("orientation"), HeldOut.of(pair))
     return find_coarse_model(matcher, context)
-
-
-def error_m(model: Model, files: TexturedPair) -> float:
-    xy = everywhere(files.grid)
-    return rms(model(xy) - files.truth.model(xy))
 
 
 @pytest.mark.parametrize("size", [(260, 240), (700, 200)])

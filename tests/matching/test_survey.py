@@ -10,12 +10,7 @@ from textured_pairs import shift_on_map, texture
 from groundtie.context import Context
 from groundtie.matching.chips import ChipMatcher
 from groundtie.matching.parts import ELSEWHERE_PX
-from groundtie.matching.survey import (
-    SURVEY_RADIUS_PX,
-    Survey,
-    survey_model,
-    survey_places,
-)
+from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.registration.rules.survey import (

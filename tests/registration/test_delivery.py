@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import json
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from contexts import context
+from evidences import LOST, refused
 from textured_pairs import TexturedPair, listing
 
 from groundtie.context import Context
-from groundtie.errors import NothingFoundError, NotRegisteredError, OutputError
+from groundtie.errors import NotRegisteredError, OutputError
 from groundtie.geometry.transform import load_transform
 from groundtie.registration import delivery
 from groundtie.registration.asked import specified
-from groundtie.registration.delivery import (
-    Call,
-    RegistrationFiles,
-)
+from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registered_output import RegisteredOutput
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import SAR_SAR
-from groundtie.registration.verdict import judge_search
 
 __all__ = ["context"]
-LOST = judge_search(NothingFoundError("nothing in common was found"))
-
-
-def refused(registration: Registration) -> Registration:
-    return replace(registration, evidence=None, check=None, verdict=LOST)
 
 
 def files_in(folder: Path) -> RegistrationFiles:

@@ -16,11 +16,7 @@ from facts_of_pairs import FIELDS, TOWN, opened, speckled
 from groundtie.context import Context
 from groundtie.masks.used import INPUT, LAYER, OPEN, REFERENCE
 from groundtie.rasters.pair import ImagePair
-from groundtie.registration.masks import (
-    Masked,
-    ground_instead,
-    with_ground_mask,
-)
+from groundtie.registration.masks import Masked, ground_instead, with_ground_mask
 from groundtie.registration.scene import SceneInfo
 from groundtie.registration.user_masks import UserMask, with_user_masks
 

@@ -10,27 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 import rasterio.shutil
+from evidences import LOST, refused
 from raster_files import write_raster
 from textured_pairs import TexturedPair, listing
 
-from groundtie.errors import (
-    NothingFoundError,
-    NotRegisteredError,
-    OutputError,
-    ParameterError,
-    SameFileError,
-)
+from groundtie.errors import NotRegisteredError, OutputError, ParameterError, SameFileError
 from groundtie.matching.check import CHECK_RADIUS_PX, Check
 from groundtie.registration.delivery import Call, RegistrationFiles
 from groundtie.registration.registration import Registration
 from groundtie.registration.specification import Specification
-from groundtie.registration.verdict import judge_search
-
-LOST = judge_search(NothingFoundError("nothing in common was found"))
-
-
-def refused(registration: Registration) -> Registration:
-    return replace(registration, evidence=None, check=None, verdict=LOST)
 
 
 def first_checks(registration: Registration, count: int) -> Registration:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from evidences import (
     GRID,
+    LOST,
     check_points,
     estimated,
     evidence,
@@ -17,7 +18,7 @@ from evidences import (
 )
 from raster_files import UTM
 
-from groundtie.errors import BandError, NothingFoundError
+from groundtie.errors import BandError
 from groundtie.geometry.chance import agreement_probability, log10_chance
 from groundtie.geometry.estimation import Estimate
 from groundtie.geometry.models import PolynomialModel
@@ -25,18 +26,11 @@ from groundtie.geometry.tie_points import TiePoints
 from groundtie.geometry.transform import Transform
 from groundtie.masks.used import MaskUsed
 from groundtie.matching.check import CHECK_RADIUS_PX
-from groundtie.registration.evidence import (
-    AGREEMENT,
-    ERROR,
-    SCENE,
-    SURVEY,
-    RegistrationEvidence,
-)
+from groundtie.registration.evidence import AGREEMENT, ERROR, SCENE, SURVEY, RegistrationEvidence
 from groundtie.registration.rules import RULES, Rule
 from groundtie.registration.verdict import NOT_JUDGED, Verdict, judge, judge_search
 
 TRUTH = Transform.nominal(UTM, GRID)
-LOST = judge_search(NothingFoundError("nothing in common was found"))
 
 
 def judged(check: TiePoints, estimate: Estimate | None = None, max_error: float = 3.0) -> Verdict:

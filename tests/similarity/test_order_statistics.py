@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from groundtie.similarity.order_statistics import (
-    median,
-    quantiles,
-    robust_deviation,
-    upper_median,
-)
+from groundtie.similarity.order_statistics import median, quantiles, robust_deviation, upper_median
 
 SIZES = (1, 2, 3, 10, 4095, 4096, 20_001)
 

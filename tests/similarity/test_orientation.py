@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
+from speckled_pairs import whole
 from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
@@ -19,12 +20,8 @@ SHAPE = (90, 100)
 INNER = (slice(12, -12), slice(12, -12))
 
 
-def everywhere(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
-
-
 def field_of(values: np.ndarray, scale: float = 1.5) -> np.ndarray:
-    patch = everywhere(values)
+    patch = whole(values)
     return squared_gradients(patch.values, patch.valid, (scale,))[0]
 
 
@@ -106,7 +103,7 @@ def test_masked_pixels_leave_no_edges(scale: float) -> None:
 
 def test_an_image_without_content_has_no_field() -> None:
     for value in (0.0, 7.0, 1e4):
-        fields = orientation_fields(everywhere(np.full(SHAPE, value)))
+        fields = orientation_fields(whole(np.full(SHAPE, value)))
         assert len(fields) == len(SCALES_PX)
         for field in fields:
             assert not field.any()
@@ -117,7 +114,7 @@ def test_a_background_without_any_detail_does_no_harm(background: float, level: 
     """More than half of the window is a lake or undeclared nodata; also in decibels."""
     image = np.full(SHAPE, background)
     image[:, 60:] = level + 15 * texture(SHAPE[0], SHAPE[1] - 60)
-    for field in orientation_fields(everywhere(image)):
+    for field in orientation_fields(whole(image)):
         assert np.isfinite(field).all()
         assert np.abs(field).max() <= 1 + 1e-6
         assert not field[:, :40].any()
@@ -135,20 +132,20 @@ def test_amplitudes_are_compressed_and_decibels_left_alone() -> None:
     amplitude = rng.rayleigh(100, SHAPE)
     decibels = 20 * np.log10(amplitude) - 50
     assert (decibels < 0).mean() > 0.5
-    found = compress(everywhere(decibels))
+    found = compress(whole(decibels))
     np.testing.assert_allclose(found, decibels.astype(np.float32))
     bright = amplitude > np.median(amplitude)
     expected = np.log(amplitude / np.median(amplitude) + 0.1)
-    np.testing.assert_allclose(compress(everywhere(amplitude))[bright], expected[bright], atol=1e-5)
+    np.testing.assert_allclose(compress(whole(amplitude))[bright], expected[bright], atol=1e-5)
     # A gain adds a constant to the logarithm, here none, as it is relative to the median.
-    scaled = compress(everywhere(amplitude * 37))
-    np.testing.assert_allclose(scaled, compress(everywhere(amplitude)), atol=1e-4)
+    scaled = compress(whole(amplitude * 37))
+    np.testing.assert_allclose(scaled, compress(whole(amplitude)), atol=1e-4)
 
 
 def test_a_few_negative_values_are_taken_for_overshoot() -> None:
     values = np.full(SHAPE, 100.0)
     values[0, :5] = -3
-    found = compress(everywhere(values))
+    found = compress(whole(values))
     assert np.isfinite(found).all()
     assert found[0, 0] == pytest.approx(np.log(0.1))
     assert found[5, 5] == pytest.approx(np.log(1.1))

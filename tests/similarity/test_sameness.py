@@ -7,11 +7,7 @@ from textured_pairs import texture
 
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.in_common import Look, sameness_of
-from groundtie.similarity.sameness import (
-    Edges,
-    Windows,
-    edges_apart_px,
-)
+from groundtie.similarity.sameness import Edges, Windows, edges_apart_px
 from groundtie.similarity.seams import step_products
 
 

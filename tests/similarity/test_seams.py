@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from speckled_pairs import whole
 from textured_pairs import texture
 
-from groundtie.rasters.patch import Patch
 from groundtie.similarity.seams import DRAWN_WIDTH, seams, step_products, step_width
 
 SIDE = 240
@@ -27,12 +27,8 @@ def tiled(values: np.ndarray, offset: int = 0) -> np.ndarray:
     return values * np.where(row[:, None] % 2, 0.5, 1.5) * np.where(col % 2, 0.5, 1.5)
 
 
-def patch(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
-
-
 def width(one: np.ndarray, other: np.ndarray) -> float:
-    return step_width(step_products(patch(one), patch(other)))
+    return step_width(step_products(whole(one), whole(other)))
 
 
 @pytest.mark.parametrize("offset", [0, 1, -1])
@@ -62,7 +58,7 @@ def test_where_nothing_varies_there_are_none() -> None:
 
 
 def test_pixels_on_both_sides_of_seams_are_masked_and_few_others() -> None:
-    mask = seams(patch(tiled(view(1, 1))), patch(tiled(view(9, 2))))
+    mask = seams(whole(tiled(view(1, 1))), whole(tiled(view(9, 2))))
     beside = np.zeros_like(mask)
     for at in COLUMNS:
         beside[:, at - 1 : at + 1] = True

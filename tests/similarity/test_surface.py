@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, median_filter
+from speckled_pairs import whole
 from textured_pairs import texture
 
 from groundtie.context import threads
@@ -52,10 +53,6 @@ def patches(
     template = 500 + 100 * (own + noise * rng.normal(size=own.shape))
     search = 2000 + 300 * (other + noise * rng.normal(size=other.shape))
     return whole(template), whole(search)
-
-
-def whole(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
 
 
 def stacked(windows: Sequence[Patch]) -> Patch:

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
+from speckled_pairs import whole
 
 from groundtie.errors import ParameterError
 from groundtie.geometry.limits import SearchLimits
@@ -98,12 +99,8 @@ def test_where_too_little_overlaps_there_is_nothing() -> None:
     )
 
 
-def patch(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
-
-
 def test_windows_are_binned_by_the_settings() -> None:
-    ramp = patch(np.arange(400.0).reshape(20, 20))
+    ramp = whole(np.arange(400.0).reshape(20, 20))
     pair = bin_pair(ramp, ramp, SimilaritySettings("mi", bins=16))
     assert pair is not None
     assert pair.measure is mutual_information
@@ -117,7 +114,7 @@ def test_windows_are_binned_by_the_settings() -> None:
 
 
 def test_flat_windows_have_nothing_to_compare() -> None:
-    ramp, flat = patch(np.arange(400.0).reshape(20, 20)), patch(np.ones((20, 20)))
+    ramp, flat = whole(np.arange(400.0).reshape(20, 20)), whole(np.ones((20, 20)))
     masked = Patch(ramp.values, np.zeros((20, 20), bool))
     for one, other in ((flat, ramp), (ramp, flat), (masked, ramp)):
         assert bin_pair(one, other, NMI) is None
@@ -125,7 +122,7 @@ def test_flat_windows_have_nothing_to_compare() -> None:
 
 @pytest.mark.parametrize("similarity", ["ncc", "orientation"])
 def test_similarities_without_joint_histogram_are_refused(similarity: str) -> None:
-    ramp = patch(np.arange(400.0).reshape(20, 20))
+    ramp = whole(np.arange(400.0).reshape(20, 20))
     with pytest.raises(ParameterError, match="joint histograms"):
         bin_pair(ramp, ramp, SimilaritySettings(similarity))
 
@@ -204,7 +201,7 @@ def smooth(seed: int, side: int, width: float = 2.0) -> np.ndarray:
 
 def test_candidates_are_distinct_best_first_and_stand_out() -> None:
     ground = smooth(0, 60)
-    pair = bin_pair(patch(ground[10:50, 10:50]), patch(-ground), NMI)
+    pair = bin_pair(whole(ground[10:50, 10:50]), whole(-ground), NMI)
     assert pair is not None
     space = PoseSpace(SearchLimits(10), spread_px((40, 40)), pair.origin)
     ends = iter([(0.0, 0.0), (1.0, 0.0), (9.0, 9.0), (9.0, 8.0), (-9.0, 0.0)])

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.ndimage import affine_transform, gaussian_filter
+from speckled_pairs import whole
 
 from groundtie.context import Context
 from groundtie.geometry.limits import SearchLimits
@@ -84,10 +85,6 @@ def texture(side: int) -> np.ndarray:
     return np.asarray(values / values.std())
 
 
-def patch(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
-
-
 def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     """Return a window and its inverted, noisy image, which lies at a pose."""
     ground = texture(side + 80)
@@ -97,7 +94,7 @@ def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     matrix = np.array([[t.e, t.d], [t.b, t.a]])
     moved = affine_transform(ground, matrix, (t.f + 40, t.c + 40), (size, size), order=3)
     noise = np.random.default_rng(9).normal(0, 0.1, moved.shape)
-    return patch(ground[inner, inner]), patch(noise - moved)
+    return whole(ground[inner, inner]), whole(noise - moved)
 
 
 @pytest.mark.slow
@@ -155,7 +152,7 @@ def test_the_same_seed_finds_the_same(search: Callable[..., list], context: Cont
 
 @pytest.mark.parametrize("search", SEARCHES)
 def test_flat_windows_have_no_pose(search: Callable[..., list], context: Context) -> None:
-    flat, textured = patch(np.ones((40, 40))), patch(texture(40))
+    flat, textured = whole(np.ones((40, 40))), whole(texture(40))
     for one, other in ((flat, textured), (textured, flat)):
         assert search(one, other, SearchLimits(5), NMI, context) == []
 
@@ -164,7 +161,7 @@ def test_flat_windows_have_no_pose(search: Callable[..., list], context: Context
 def test_without_room_the_nominal_pose_is_found(
     search: Callable[..., list], context: Context
 ) -> None:
-    window = patch(texture(40))
+    window = whole(texture(40))
     (found,) = search(window, window, SearchLimits(0), NMI, context)
     assert found.pose == Pose()
     assert found.height == 0.0

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.ndimage import affine_transform, gaussian_filter
+from speckled_pairs import whole
 
 from groundtie.context import Context
 from groundtie.errors import ParameterError
@@ -151,10 +152,6 @@ def texture(side: int, seed: int = 0) -> np.ndarray:
     return np.asarray(values / values.std())
 
 
-def patch(values: np.ndarray) -> Patch:
-    return Patch(values.astype(np.float32), np.ones(values.shape, bool))
-
-
 def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     """Return a window and its inverted, noisy image, which lies at a pose."""
     ground = texture(side + 80)
@@ -164,7 +161,7 @@ def posed(pose: Pose, side: int = 64, margin: int = 20) -> tuple[Patch, Patch]:
     matrix = np.array([[t.e, t.d], [t.b, t.a]])
     moved = affine_transform(ground, matrix, (t.f + 40, t.c + 40), (size, size), order=3)
     noise = np.random.default_rng(9).normal(0, 0.1, moved.shape)
-    return patch(ground[inner, inner]), patch(noise - moved)
+    return whole(ground[inner, inner]), whole(noise - moved)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -207,7 +204,7 @@ def test_rotation_and_scale_are_found_with_the_shift(
 def test_windows_of_unlike_parity(context: Context) -> None:
     """Their pixels meet where the centres are half a pixel apart."""
     ground = texture(100)
-    reference, input = patch(ground[20:80, 20:80]), patch(-ground[9:92, 11:94])
+    reference, input = whole(ground[20:80, 20:80]), whole(-ground[9:92, 11:94])
     found = replace(discrete_spsa, effort=Effort(agreeing=4))(
         reference, input, SearchLimits(8), NMI, context
     )
@@ -228,14 +225,14 @@ def test_the_seed_decides(context: Context) -> None:
 
 @pytest.mark.parametrize("search", [spsa, spsa_second_order, discrete_spsa])
 def test_flat_windows_have_no_pose(search: Callable[..., list], context: Context) -> None:
-    flat, textured = patch(np.ones((40, 40))), patch(texture(40))
+    flat, textured = whole(np.ones((40, 40))), whole(texture(40))
     for one, other in ((flat, textured), (textured, flat)):
         assert search(one, other, SearchLimits(5), NMI, context) == []
 
 
 @pytest.mark.parametrize("limits", [SearchLimits(5, 1.0), SearchLimits(5, scale=(0.9, 1.1))])
 def test_discrete_spsa_neither_rotates_nor_scales(limits: SearchLimits, context: Context) -> None:
-    window = patch(texture(40))
+    window = whole(texture(40))
     with pytest.raises(ParameterError, match="shifts alone"):
         discrete_spsa(window, window, limits, NMI, context)
 
@@ -244,7 +241,7 @@ def test_discrete_spsa_neither_rotates_nor_scales(limits: SearchLimits, context:
 def test_without_room_the_nominal_pose_is_found(
     search: Callable[..., list], context: Context
 ) -> None:
-    window = patch(texture(40))
+    window = whole(texture(40))
     (found,) = search(window, window, SearchLimits(0), NMI, context)
     assert found.pose == Pose()
     assert (found.height, found.evaluations) == (0.0, 1)

@@ -49,11 +49,6 @@ class HogDescriptor:
 
     directions: int = 9
 
-    @property
-    def length(self) -> int:
-        """Number of values of a descriptor."""
-        return CELLS * CELLS * self.directions
-
     def describe(self, window: Patch, found: Keypoints) -> tuple[Keypoints, FloatImage]:
         """Return the n keypoints and their descriptors.
 
@@ -73,14 +68,10 @@ class HogDescriptor:
             columns towards rows.
         """
         fields = gradient_at_scale(compress(window), window.valid, _SCALE_PX)
-        return found, self._described(fields, found)
-
-    def _described(self, fields: Gradient, points: Keypoints) -> FloatImage:
-        """Return the descriptors of keypoints."""
         height, width = fields[0].shape
-        cols, rows = np.rint(points.position_px).astype(np.intp).T
+        cols, rows = np.rint(found.position_px).astype(np.intp).T
         cols, rows = np.clip(cols, 0, width - 1), np.clip(rows, 0, height - 1)
-        values = np.empty((len(points), CELLS, CELLS, self.directions), np.float32)
+        values = np.empty((len(found), CELLS, CELLS, self.directions), np.float32)
         for first in range(0, height, _BAND_ROWS):
             own = np.nonzero((rows >= first) & (rows < first + _BAND_ROWS))[0]
             if len(own) == 0:
@@ -89,7 +80,7 @@ class HogDescriptor:
             for start in range(0, len(own), _BLOCK):
                 block = own[start : start + _BLOCK]
                 values[block] = self._in_cells(band, cols[block], rows[block] - first)
-        return unit_rows(values.reshape(len(points), self.length))
+        return found, unit_rows(values.reshape(len(found), CELLS * CELLS * self.directions))
 
     def _band(self, fields: Gradient, first: int) -> FloatImage:
         """Return the shares of all directions at the pixels of the patches in a band of rows.

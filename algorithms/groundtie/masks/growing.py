@@ -91,7 +91,7 @@ def _seeds(variation2: NDArray[np.float32], largest: float) -> NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class Shape:
-    """Area, and sides of the rectangle with the region's second moments, in pixels."""
+    """Area, and sides of the rectangle with the region's second moments, in pixels, 1 at least."""
 
     area: float
     length: float
@@ -105,10 +105,10 @@ class Shape:
         # Each pixel is a square with second moments of its own.
         xx, yy, xy = m["mu20"] / area + 1 / 12, m["mu02"] / area + 1 / 12, m["mu11"] / area
         middle, half = (xx + yy) / 2, float(np.hypot((xx - yy) / 2, xy))
-        sides = np.sqrt(12 * np.maximum([middle + half, middle - half], 0))
+        sides = np.sqrt(12 * np.array([middle + half, middle - half]))
         return cls(area, float(sides[0]), float(sides[1]))
 
     @property
     def elongation(self) -> float:
         """Length over width, at least 1."""
-        return self.length / max(self.width, 1e-9)
+        return self.length / self.width

@@ -51,17 +51,17 @@ class LineOfSight:
     ----------
     towards_px
         Columns and rows for a metre of ground towards the sensor.
-    tangent
-        Tangent of the angle between the line of sight and the vertical, above 0.
+    angle_deg
+        Angle between the line of sight and the vertical, 0 to below 90.
     """
 
     towards_px: tuple[float, float]
-    tangent: float
+    angle_deg: float
 
-    @classmethod
-    def from_vertical(cls, towards_px: tuple[float, float], angle_deg: float) -> LineOfSight:
-        """Return the line of sight at an angle from the vertical, 0 to below 90."""
-        return cls(towards_px, math.tan(math.radians(angle_deg)))
+    @property
+    def tangent(self) -> float:
+        """Tangent of the angle: the ground that a metre of height hides, in metres."""
+        return math.tan(math.radians(self.angle_deg))
 
     @property
     def pixel_m(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RasterContentError
-from ..progress import SILENT, Progress
+from ..progress import Progress
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.windows import cut
@@ -79,7 +79,7 @@ class ReducedScene:
     patch: Patch
 
     @classmethod
-    def of(cls, scene: Scene, progress: Progress = SILENT) -> ReducedScene:
+    def of(cls, scene: Scene, progress: Progress) -> ReducedScene:
         """Read a scene.
 
         Raises

@@ -12,19 +12,20 @@ from ..rasters.reading import Mask
 # Neighbours in clockwise order from the one above, as (down, right).
 _CIRCLE = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 
+# Number of neighbours in each of the 256 neighbourhoods.
+_NEIGHBOURS = np.array([code.bit_count() for code in range(256)])
+
 
 def _removable(second: bool) -> NDArray[np.bool_]:
     """Return for each of the 256 neighbourhoods whether a subiteration may remove its centre."""
-    codes = np.arange(256)
-    p = [(codes >> k) & 1 for k in range(8)]
-    count = np.sum(p, axis=0)
+    p = [(np.arange(256) >> k) & 1 for k in range(8)]
     rises = np.sum([(p[k] == 0) & (p[(k + 1) % 8] == 1) for k in range(8)], axis=0)
     above, right, below, left = p[0], p[2], p[4], p[6]
     if second:
         corner = (above * right * left == 0) & (above * below * left == 0)
     else:
         corner = (above * right * below == 0) & (right * below * left == 0)
-    return np.asarray((count >= 2) & (count <= 6) & (rises == 1) & corner)
+    return np.asarray((_NEIGHBOURS >= 2) & (_NEIGHBOURS <= 6) & (rises == 1) & corner)
 
 
 _TABLES = (_removable(False), _removable(True))
@@ -71,9 +72,6 @@ def pruned(skeleton: Mask, length_px: int) -> Mask:
         lines.image[left[neighbours <= 1]] = 0
         left = left[neighbours > 1]
     return lines.mask
-
-
-_NEIGHBOURS = np.array([bin(code).count("1") for code in range(256)])
 
 
 @dataclass(frozen=True)

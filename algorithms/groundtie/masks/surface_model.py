@@ -18,16 +18,10 @@ from numpy.typing import NDArray
 from ..errors import NoOverlapError
 from ..geometry.views import RADAR, View, direction
 from ..progress import SILENT, Progress
-from ..rasters.grid import Grid
+from ..rasters.grid import linear_part
 from ..rasters.reading import FloatImage, Mask, Window
 from ..rasters.tiling import tiles
-from .object_heights import (
-    GROUND_REACH_M,
-    LOWEST_M,
-    FootprintModel,
-    SurfaceModel,
-    ground_cell_px,
-)
+from .object_heights import GROUND_REACH_M, LOWEST_M, FootprintModel, SurfaceModel, ground_cell_px
 from .ray_casting import Heights, LineOfSight, double_bounce, hidden_ground, radar_echoes
 from .scene import Scene, Selection, write_tiles
 from .threshold import disc, grown
@@ -85,7 +79,7 @@ class SurfaceGround:
         heights, known, inside = self._around(window)
         found = [(Reason.RAISED, heights.surface_m > heights.ground_m), (Reason.UNKNOWN, ~known)]
         for view in self.views:
-            found += _not_shown(heights, view, self.scene.grid)
+            found += self._not_shown(heights, view)
         reasons = np.zeros(known.shape, np.uint8)
         for reason, where in found:
             reasons[grown(where, disc(_GROWN_PX))] |= np.uint8(reason)
@@ -100,7 +94,7 @@ class SurfaceGround:
         if view.sensor == RADAR:
             shown = self._echoes(heights, view).astype(np.float32)
         else:
-            found = dict(_not_shown(heights, view, self.scene.grid))
+            found = dict(self._not_shown(heights, view))
             dark = found.get(Reason.CAST_SHADOW, np.zeros((), bool)) & ~found[Reason.HIDDEN]
             shown = np.asarray(~dark, np.float32)
         return np.log(shown[inside] + _SHADOW)
@@ -111,15 +105,35 @@ class SurfaceGround:
         `bounce` is the number of echoes that double bounce adds for each pixel of a wall's height.
         """
         heights, known, inside = self._around(window)
-        lines = double_bounce(heights, _sight(view, self.scene.grid))
+        lines = double_bounce(heights, self._sight(view.azimuth_deg, view.incidence_deg))
         power = (self._echoes(heights, view) + np.float32(bounce) * lines)[inside] + _SHADOW
         return np.where(known[inside], np.sqrt(power), np.float32(np.nan))
 
     def _echoes(self, heights: Heights, view: View) -> NDArray[np.int32]:
         """Return the number of echoes in each pixel of a radar image, including the ground's."""
-        sight = _sight(view, self.scene.grid)
+        sight = self._sight(view.azimuth_deg, view.incidence_deg)
         ground = ~hidden_ground(heights, sight) & (heights.surface_m == heights.ground_m)
         return radar_echoes(heights, sight) + ground
+
+    def _not_shown(self, heights: Heights, view: View) -> list[tuple[Reason, Mask]]:
+        """Return the ground that an image from a view does not show, by reason."""
+        sight = self._sight(view.azimuth_deg, view.incidence_deg)
+        hidden = hidden_ground(heights, sight)
+        if view.sensor == RADAR:
+            laid_over = radar_echoes(heights, sight) > 0
+            return [(Reason.RADAR_SHADOW, hidden), (Reason.LAYOVER, np.asarray(laid_over))]
+        found = [(Reason.HIDDEN, hidden)]
+        if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
+            sunlight = self._sight(view.sun_azimuth_deg, 90 - view.sun_elevation_deg)
+            found.append((Reason.CAST_SHADOW, hidden_ground(heights, sunlight)))
+        return found
+
+    def _sight(self, azimuth_deg: float, angle_deg: float) -> LineOfSight:
+        """Return the line of sight towards an azimuth, at an angle from the vertical."""
+        grid = self.scene.grid
+        units = np.matmul(direction(azimuth_deg), grid.east_north)
+        cols, rows = np.linalg.solve(linear_part(grid.transform), units).tolist()
+        return LineOfSight((cols, rows), angle_deg)
 
     def require_cover(self) -> None:
         """Raise `NoOverlapError` if the model has no heights in the scene."""
@@ -183,30 +197,3 @@ def _longest(view: View) -> float:
     if view.sun_elevation_deg is not None:
         tangents.append(1 / math.tan(math.radians(view.sun_elevation_deg)))
     return max(tangents)
-
-
-def _not_shown(heights: Heights, view: View, grid: Grid) -> list[tuple[Reason, Mask]]:
-    """Return the ground that an image from a view does not show, by reason."""
-    sight = _sight(view, grid)
-    hidden = hidden_ground(heights, sight)
-    if view.sensor == RADAR:
-        laid_over = radar_echoes(heights, sight) > 0
-        return [(Reason.RADAR_SHADOW, hidden), (Reason.LAYOVER, np.asarray(laid_over))]
-    found = [(Reason.HIDDEN, hidden)]
-    if view.sun_azimuth_deg is not None and view.sun_elevation_deg is not None:
-        towards_sun = _on_pixels(view.sun_azimuth_deg, grid)
-        sunlight = LineOfSight.from_vertical(towards_sun, 90 - view.sun_elevation_deg)
-        found.append((Reason.CAST_SHADOW, hidden_ground(heights, sunlight)))
-    return found
-
-
-def _sight(view: View, grid: Grid) -> LineOfSight:
-    return LineOfSight.from_vertical(_on_pixels(view.azimuth_deg, grid), view.incidence_deg)
-
-
-def _on_pixels(azimuth_deg: float, grid: Grid) -> tuple[float, float]:
-    """Return the columns and rows of a grid for a metre of ground towards an azimuth."""
-    units = np.matmul(direction(azimuth_deg), grid.east_north)
-    linear = np.array([[grid.transform.a, grid.transform.b], [grid.transform.d, grid.transform.e]])
-    cols, rows = np.linalg.solve(linear, units).tolist()
-    return cols, rows

@@ -44,7 +44,7 @@ class ThresholdMask:
     def of(
         cls,
         scene: Scene,
-        high_percent: float = HIGH_PERCENT,
+        high_percent: float,
         low_percent: float = 0.0,
         grow_m: float = 0.0,
         progress: Progress = SILENT,

@@ -27,7 +27,7 @@ from ..geometry.model_choice import (
 from ..geometry.models import PARAMETERS, TERRAIN, Model
 from ..geometry.rows import Rows
 from ..geometry.terrain import Terrain
-from ..rasters.grid import FloatArray, PointFunction, apply_affine
+from ..rasters.grid import FloatArray, PointFunction, apply_affine, linear_part
 from .belief_propagation import Surfaces
 from .families import Family, coefficients_of
 
@@ -77,8 +77,7 @@ class Prior:
     @classmethod
     def of_affine(cls, affine: Affine) -> Prior:
         """Return the prior of an affine transform."""
-        linear = np.array([[affine.a, affine.b], [affine.d, affine.e]])
-        return cls(lambda px: apply_affine(affine, px), linear)
+        return cls(lambda px: apply_affine(affine, px), linear_part(affine))
 
 
 # The prior of an input at its nominal place.

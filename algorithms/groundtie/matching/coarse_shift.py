@@ -38,7 +38,7 @@ SAME_PLACE_PX = 4
 _SAME_PLACE = np.ones((2 * SAME_PLACE_PX + 1,) * 2, bool)
 
 # Few bins keep counting over a large search window fast, and are enough for whole scenes.
-LEVEL_BINS = 8
+_LEVEL_BINS = 8
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,9 @@ def level_factor(grid: Grid) -> float:
     return max(max(grid.size) / LEVEL_SIDE_PX, 1.0)
 
 
-def coarse_candidates(
-    pair: ImagePair,
-    level: Grid,
-    settings: SimilaritySettings,
-    held_out: MaskOf | None,
-    context: Context,
-) -> list[Candidate]:
-    """Return the best shifts or poses, best first, within the limits of a pair.
+@dataclass(frozen=True)
+class LevelSearch:
+    """A whole pair on a level of the pyramid, compared at many shifts or poses.
 
     Parameters
     ----------
@@ -75,29 +70,95 @@ def coarse_candidates(
         Takes a piece of the grid and returns which pixels of the reference are hidden; None: none.
     context
         Threads.
-
-    Raises
-    ------
-    RasterContentError
-        One of the images is constant or has no valid pixel in the overlap, perhaps due to its mask.
     """
-    if settings.bins is None:
-        settings = replace(settings, bins=LEVEL_BINS)
-    limits = pair.limits
-    if limits.is_shift:
-        nominal = shift_model(0.0, 0.0)
-        places = _places(pair, level, settings, held_out, context, nominal)
-        return [Candidate(_shift_on_map(place, level), place.height) for place in places]
-    windows = read_windows(pair.reference, pair.input, limits.scale, limits.radius, held_out)
-    pose_limits = windows.limits(limits.rotation_deg, limits.scale)
-    found = find_poses(windows.reference, windows.input, pose_limits, context.quiet())
-    high = [one for one in found[:MOST_CANDIDATES] if one.height > found[0].height * _LOW]
-    poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
-    if not poses:
-        return []
-    places = _places(pair, level, settings, held_out, context, poses[0].model)
-    poses += _elsewhere(poses[0], places, level)
-    return sorted(poses, key=lambda one: one.height, reverse=True)
+
+    pair: ImagePair
+    level: Grid
+    settings: SimilaritySettings
+    held_out: MaskOf | None
+    context: Context
+
+    def candidates(self) -> list[Candidate]:
+        """Return the best shifts or poses, best first, within the limits of the pair.
+
+        Raises
+        ------
+        RasterContentError
+            One of the images is constant or has no valid pixel in the overlap, perhaps due to its
+            mask.
+        """
+        pair, level, limits = self.pair, self.level, self.pair.limits
+        if limits.is_shift:
+            places = self._places(shift_model(0.0, 0.0))
+            return [Candidate(_shift_on_map(place, level), place.height) for place in places]
+        windows = read_windows(
+            pair.reference, pair.input, limits.scale, limits.radius, self.held_out
+        )
+        pose_limits = windows.limits(limits.rotation_deg, limits.scale)
+        found = find_poses(windows.reference, windows.input, pose_limits, self.context.quiet())
+        high = [one for one in found[:MOST_CANDIDATES] if one.height > found[0].height * _LOW]
+        poses = [Candidate(_on_map(windows.transform(one.pose), level), one.height) for one in high]
+        if not poses:
+            return []
+        poses += _elsewhere(poses[0], self._places(poses[0].model), level)
+        return sorted(poses, key=lambda one: one.height, reverse=True)
+
+    def _places(self, model: Model) -> list[Peak]:
+        """Search all shifts relative to a model; return the highest peaks of their similarity."""
+        level = self.level
+        # The true shift may lie a pixel of the level beyond the nearest whole pixel.
+        radius_px = int(np.ceil(self.pair.limits.radius / min(level.pixel_sides_m))) + 1
+        # At larger shifts the images overlap too little.
+        radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
+        surface, _ = self.surface(model, radius_px)
+        found: list[Peak] = []
+        for _ in range(MOST_CANDIDATES):
+            peak = find_peak(surface)
+            if peak.height <= (found[0].height * _LOW if found else 0.0):
+                break
+            found.append(peak)
+            x, y = peak.shift_px
+            suppress(surface, (round(y) + radius_px, round(x) + radius_px), _SAME_PLACE)
+        return found
+
+    def surface(
+        self, model: Model, radius_px: int
+    ) -> tuple[Surface, Callable[[], NDArray[np.float32]]]:
+        """Compare the pair at shifts of up to a radius relative to a model.
+
+        Returns
+        -------
+        The similarity, shape (2 radius_px + 1, 2 radius_px + 1); and a function that returns, in
+        the same shape, the share of the reference's valid pixels that meets valid ones.
+        """
+        settings, context, level = self.settings, self.context, self.level
+        if settings.bins is None:
+            settings = replace(settings, bins=_LEVEL_BINS)
+        reference, input = self._patches(model, radius_px + BORDER_PX)
+        # Only the unmasked share of the input can overlap with the reference.
+        valid = 1.0 if self.pair.input.mask is None else input.valid_share
+        template = describe(reference, level.width * level.height, settings, context.memo)
+        search = describe(input, level.width * level.height, settings)
+        surface = similarity_surface(template, search, radius_px, settings, context.quiet(), valid)
+        return surface, partial(overlap_share, template.patch, search.patch)
+
+    def _patches(self, model: Model, reach: int) -> tuple[Patch, Patch]:
+        """Return the reference with a margin around the level, and the input with a wider one."""
+        pair, level = self.pair, self.level
+        template, search = (
+            level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
+            for more in (BORDER_PX, reach)
+        )
+        hidden = None if self.held_out is None else self.held_out(template)
+        of_reference = template, pair.reference.source.grid.map_to_pixel, hidden
+        of_input = search, pair.transform(model)
+        reading = self.context.executor.submit(pair.reference.read_onto, *of_reference)
+        input = pair.input.read_onto(*of_input)
+        reference = reading.result()
+        where = "where the images overlap"
+        require_content(pair.reference, reference, where, *of_reference)
+        require_content(pair.input, input, where, *of_input)
+        return reference, input
 
 
 def _shift_on_map(place: Peak, level: Grid) -> Model:
@@ -126,82 +187,6 @@ def _elsewhere(pose: Candidate, places: list[Peak], level: Grid) -> list[Candida
         for place in places
         if not is_own(place)
     ]
-
-
-def _places(
-    pair: ImagePair,
-    level: Grid,
-    settings: SimilaritySettings,
-    held_out: MaskOf | None,
-    context: Context,
-    model: Model,
-) -> list[Peak]:
-    """Search all shifts relative to a model, and return the highest peaks of their similarity."""
-    # The true shift may lie a pixel of the level beyond the nearest whole pixel.
-    radius_px = int(np.ceil(pair.limits.radius / min(level.pixel_sides_m))) + 1
-    # At larger shifts the images overlap too little.
-    radius_px = min(radius_px, int((1 - MINIMUM_OVERLAP) * max(level.size)))
-    surface, _ = level_surface(pair, level, settings, held_out, context, model, radius_px)
-    found: list[Peak] = []
-    for _ in range(MOST_CANDIDATES):
-        peak = find_peak(surface)
-        if peak.height <= (found[0].height * _LOW if found else 0.0):
-            break
-        found.append(peak)
-        x, y = peak.shift_px
-        suppress(surface, (round(y) + radius_px, round(x) + radius_px), _SAME_PLACE)
-    return found
-
-
-def level_surface(
-    pair: ImagePair,
-    level: Grid,
-    settings: SimilaritySettings,
-    held_out: MaskOf | None,
-    context: Context,
-    model: Model,
-    radius_px: int,
-) -> tuple[Surface, Callable[[], NDArray[np.float32]]]:
-    """Compare a whole pair at shifts of up to a radius relative to a model.
-
-    Returns
-    -------
-    The similarity, shape (2 radius_px + 1, 2 radius_px + 1); and a function that returns, in the
-    same shape, the share of the reference's valid pixels that meets valid ones.
-    """
-    reach = radius_px + BORDER_PX
-    reference, input = _patches(pair, level, model, reach, held_out, context)
-    # Only the unmasked share of the input can overlap with the reference.
-    valid = 1.0 if pair.input.mask is None else input.valid_share
-    template = describe(reference, level.width * level.height, settings, context.memo)
-    search = describe(input, level.width * level.height, settings)
-    surface = similarity_surface(template, search, radius_px, settings, context.quiet(), valid)
-    return surface, partial(overlap_share, template.patch, search.patch)
-
-
-def _patches(
-    pair: ImagePair,
-    level: Grid,
-    model: Model,
-    reach: int,
-    held_out: MaskOf | None,
-    context: Context,
-) -> tuple[Patch, Patch]:
-    """Return the reference with a margin around the level, and the input with a wider one."""
-    template, search = (
-        level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
-        for more in (BORDER_PX, reach)
-    )
-    hidden = None if held_out is None else held_out(template)
-    of_reference = template, pair.reference.source.grid.map_to_pixel, hidden
-    of_input = search, pair.transform(model)
-    reading = context.executor.submit(pair.reference.read_onto, *of_reference)
-    input = pair.input.read_onto(*of_input)
-    reference = reading.result()
-    where = "where the images overlap"
-    require_content(pair.reference, reference, where, *of_reference)
-    require_content(pair.input, input, where, *of_input)
-    return reference, input
 
 
 def _on_map(transform: Transform, level: Grid) -> Model:

@@ -15,7 +15,7 @@ from ..rasters.grid import Grid, mesh
 from ..rasters.held_images import held_on_level
 from ..rasters.pair import ImagePair
 from ..similarity.surface import SimilaritySettings
-from .coarse_shift import LEVEL_BINS, SAME_PLACE_PX, level_factor, level_surface
+from .coarse_shift import SAME_PLACE_PX, LevelSearch, level_factor
 from .matcher import MaskOf
 from .parts import CANOPIES_PX, CANOPIES_SHARE, FarPlace, Part, largest_group
 from .survey import SURVEY_RADIUS_PX, Survey
@@ -24,7 +24,7 @@ from .survey import SURVEY_RADIUS_PX, Survey
 _EDGES = SimilaritySettings("orientation")
 
 # All that a part and its place elsewhere may have in common.
-_ALL = SimilaritySettings(bins=LEVEL_BINS)
+_ALL = SimilaritySettings()
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,8 @@ class FarSearch:
         radius_px = int(DEFAULT_RADIUS_SHARE * max(self.level.size))
         # What is hidden depends on the survey, so that descriptions cannot be reused.
         context = self.context if hidden is None else replace(self.context, memo=None)
-        surface, overlap = level_surface(
-            self.pair, self.level, settings, hidden, context, self.model, radius_px
-        )
+        search = LevelSearch(self.pair, self.level, settings, hidden, context)
+        surface, overlap = search.surface(self.model, radius_px)
         if hidden is not None:
             # A part may lie at the border. The fewer pixels overlap, the higher chance reaches.
             surface = surface * np.sqrt(np.maximum(overlap(), 0))

@@ -18,12 +18,7 @@ from ..rasters.grid import Grid, PointFunction
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.description import BORDER_PX
-from ..similarity.in_common import (
-    LOOK_REACH_PX,
-    Look,
-    drawn_edges,
-    sameness_of,
-)
+from ..similarity.in_common import LOOK_REACH_PX, Look, drawn_edges, sameness_of
 from ..similarity.sameness import REACH_PX, WINDOW_PX, Windows, covered
 from ..similarity.seams import seams, step_products
 from .chip_windows import ChipWindows, Resampled, singly

@@ -13,7 +13,7 @@ from ..geometry.models import Model
 from ..rasters.grid import Grid
 from ..rasters.held_images import held_on_level
 from .chips import ChipMatcher
-from .coarse_shift import SAME_PLACE_PX, Candidate, coarse_candidates, level_factor
+from .coarse_shift import SAME_PLACE_PX, Candidate, LevelSearch, level_factor
 from .level_fit import CoarseModel, fit_level, fit_level_pooled
 from .pooled import PooledHistogramMatcher
 from .surface_fit import FIT_RADIUS_PX, SurfaceMatcher
@@ -67,7 +67,8 @@ def find_coarse_model(matcher: SurfaceMatcher, context: Context) -> Model:
     level = pair.grid.scaled(factor)
     if pair.limits.is_shift:  # others look at larger and smaller pixels, too
         pair = held_on_level(pair, level, context.quiet())
-    candidates = coarse_candidates(pair, level, matcher.settings, matcher.held_out, context)
+    search = LevelSearch(pair, level, matcher.settings, matcher.held_out, context)
+    candidates = search.candidates()
     context.update(0.3)
     if isinstance(matcher, PooledHistogramMatcher):
         return _descend_pooled(matcher, candidates, factor, context)
@@ -86,19 +87,19 @@ def _descend(
     level = grid.scaled(factor)
     tried: list[CoarseModel] = []
     for candidate in candidates:
-        certain = tried and min(_alarms(model) for model in tried) < _CERTAIN
-        if certain and candidate.height < RIVAL_HEIGHT * candidates[0].height:
+        is_certain = any(one.log10_false_alarms < _CERTAIN for one in tried)
+        if is_certain and candidate.height < RIVAL_HEIGHT * candidates[0].height:
             break
         tried.append(fit_level(coarsest, level, candidate.model, _RADIUS_PX, quiet))
-    if not tried or min(map(_alarms, tried)) > _HOPELESS:
+    best = min(tried, key=lambda one: one.log10_false_alarms, default=None)
+    if best is None or best.log10_false_alarms > _HOPELESS:
         raise NothingFoundError("nothing in common was found")
-    best = min(tried, key=_alarms)
     _require_no_rival(best, tried, level)
     while not _reaches_tie_points(factor):
         finer_factor = max(factor / _STEP, 1.0)
         finer_level = grid.scaled(finer_factor)
         finer = fit_level(matcher, finer_level, best.model, _reach_px(factor / finer_factor), quiet)
-        if _alarms(finer) < _HOPELESS:
+        if finer.log10_false_alarms < _HOPELESS:
             best = finer
         factor = finer_factor
     return best.model
@@ -131,16 +132,12 @@ def _reaches_tie_points(factor: float) -> bool:
     return _reach_px(factor) <= FIT_RADIUS_PX
 
 
-def _alarms(model: CoarseModel) -> float:
-    return model.log10_false_alarms
-
-
 def _require_no_rival(best: CoarseModel, tried: list[CoarseModel], level: Grid) -> None:
     centre = level.pixel_to_map([level.centre_px])
     for other in tried:
         apart = level.map_to_pixel(other.model(centre)) - level.map_to_pixel(best.model(centre))
         distance_px = float(np.hypot(*apart[0]))
-        evident = _alarms(other) < _RIVAL_EVIDENCE * _alarms(best)
+        evident = other.log10_false_alarms < _RIVAL_EVIDENCE * best.log10_false_alarms
         if distance_px > SAME_PLACE_PX and evident:
             distance = distance_px * level.pixel_size_m
             raise AmbiguousPlaceError(f"two places match about as well, {distance:.0f} m apart")

@@ -443,6 +443,11 @@ def compose(*transforms: Affine) -> Affine:
     return reduce(_product, transforms)
 
 
+def linear_part(transform: Affine) -> FloatArray:
+    """Return the matrix of an affine transform without its shift, shape (2, 2)."""
+    return np.array([[transform.a, transform.b], [transform.d, transform.e]])
+
+
 def apply_affine(transform: Affine, points: ArrayLike) -> FloatArray:
     """Return `points`, shape (n, 2), moved by an affine transform."""
     x, y = np.asarray(points, float).reshape(-1, 2).T

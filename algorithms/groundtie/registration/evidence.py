@@ -290,7 +290,7 @@ class RegistrationEvidence(ImagesEvidence):
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the points that were used."""
         fitted, size = self.estimate.points, self.grid.size
-        return 1 - hull_share(self.grid.map_to_pixel(fitted.reference_xy[fitted.used]), size)
+        return outside_hull(self.grid.map_to_pixel(fitted.reference_xy[fitted.used]), size)
 
 
 @dataclass(frozen=True)
@@ -335,9 +335,9 @@ class DateEvidence:
         return "; ".join(f"{reason} ({count} of {len(self.refusals)})" for reason, count in counted)
 
 
-def hull_share(px: FloatArray, size: tuple[int, int]) -> float:
-    """Return the share of an image of `size`, (width, height), that the hull of points covers."""
+def outside_hull(px: FloatArray, size: tuple[int, int]) -> float:
+    """Return the share of an image of `size`, (width, height), outside of the hull of points."""
     if len(px) < 3 or not np.isfinite(px).all():
-        return 0.0
+        return 1.0
     area = cv2.contourArea(cv2.convexHull(px.astype(np.float32)))
-    return float(np.clip(area / (size[0] * size[1]), 0, 1))
+    return float(np.clip(1 - area / (size[0] * size[1]), 0, 1))

@@ -14,10 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..context import Context
-from ..errors import (
-    NothingFoundError,
-    TooFewPointsError,
-)
+from ..errors import NothingFoundError, TooFewPointsError
 from ..geometry.accuracy import NOTHING_COMMON, Common
 from ..geometry.judging import TOLERANCE_PX
 from ..geometry.models import Model

@@ -15,7 +15,7 @@ from ..errors import ParameterError
 from ..geometry.models import SHAPE_PRESERVING
 from ..geometry.terrain import Terrain
 from ..masks.used import MaskUsed
-from ..rasters.grid import Grid
+from ..rasters.grid import Grid, linear_part
 from ..rasters.pair import Image, ImagePair, coarser_m, default_radius_m, make_pair
 from ..rasters.reading import open_raster
 from ..rasters.rendered import rendered
@@ -138,8 +138,8 @@ def _require_square(kind: str, grid: Grid) -> None:
     """Refuse a model that preserves shapes in pixels whose shapes are not those on the ground."""
     if kind not in SHAPE_PRESERVING:
         return
-    linear = np.reshape([*grid.transform][:6], (2, 3))[:, :2]
-    longer, shorter = np.linalg.svd(np.diag(grid.metres_per_unit) @ linear, compute_uv=False)
+    ground = np.diag(grid.metres_per_unit) @ linear_part(grid.transform)
+    longer, shorter = np.linalg.svd(ground, compute_uv=False)
     if longer > _SQUARE * shorter:
         raise ParameterError(
             f"the {kind} model preserves shapes in pixels, and the reference's are "

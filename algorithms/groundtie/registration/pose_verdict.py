@@ -27,7 +27,7 @@ from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE, PoseWindows
 from ..pose.search import find_poses, moved_px
 from ..rasters.pair import Image, make_pair
 from ..rasters.patch import Patch
-from .evidence import AGREEMENT, BANDS, ERROR, POSE, SURVEY, Agreement, ImagesEvidence, hull_share
+from .evidence import AGREEMENT, BANDS, ERROR, POSE, SURVEY, Agreement, ImagesEvidence, outside_hull
 from .layover import CHIPS_MEAN_OVER_SCATTER, mean_of_heights_px
 from .rules.pose import SAME_SHARE
 from .scene import SceneInfo
@@ -177,7 +177,7 @@ class PoseSurveyEvidence(ImagesEvidence):
     def extrapolated_share(self) -> float:
         """Share of the overlap outside of the hull of the chips that agree."""
         grid, agreeing = self.found.grid, self.found.px[self.found.agrees]
-        return 1 - hull_share(agreeing.astype(float), grid.size)
+        return outside_hull(agreeing.astype(float), grid.size)
 
 
 def confirm_pose(

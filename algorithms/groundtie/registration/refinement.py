@@ -28,7 +28,7 @@ from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.heights import ConstantHeight, Heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
-from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, hull_share
+from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, outside_hull
 from .ground_control import GroundControl
 from .sensor_input import OrientedImage
 from .verdict import Verdict, judge, judge_search
@@ -67,7 +67,7 @@ class RefinementEvidence:
     check: Control | None
     metres_per_px: float
     max_error_px: float
-    folding_px: float = 0.0
+    folding_px: float
     needs_spread: bool = True
     common: Common = NOTHING_COMMON
 
@@ -92,7 +92,7 @@ class RefinementEvidence:
     @property
     def extrapolated_share(self) -> float:
         """Share of the image outside of the hull of the control."""
-        return 1 - hull_share(self._used_px, self.control.size)
+        return outside_hull(self._used_px, self.control.size)
 
     @cached_property
     def held_out(self) -> Agreement:
@@ -192,7 +192,7 @@ class RefinedRpc:
     verdict: Verdict
     heights: HeightCheck
     mask: MaskUsed | None
-    survey: Survey | None = None
+    survey: Survey | None
     files: Mapping[str, str] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
 

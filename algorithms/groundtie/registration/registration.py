@@ -47,7 +47,7 @@ from .registered_output import (
 from .scene import SceneInfo
 from .specification import Specification
 from .stored_transform import transform_of
-from .verdict import NOT_JUDGED, Verdict
+from .verdict import Verdict
 
 _LOG = logging.getLogger(__name__)
 
@@ -112,7 +112,7 @@ class Registration:
     spec: Specification
     scene: SceneInfo
     mask: MaskUsed
-    verdict: Verdict = NOT_JUDGED
+    verdict: Verdict
     check: Check | None = None
     evidence: RegistrationEvidence | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)

@@ -240,9 +240,8 @@ class SceneInfo:
             return self.reference.open_ground(piece)
 
         def of_input(piece: Grid) -> Mask:
-            middle = np.array([[piece.width - 1, piece.height - 1]]) / 2
-            moved = piece.map_to_pixel(model(piece.pixel_to_map(middle))) - middle
-            col, row = (int(n) for n in np.rint(moved[0]))
+            middle = piece.map_to_pixel(model(piece.pixel_to_map([piece.centre_px])))[0]
+            col, row = np.rint(middle - piece.centre_px).astype(int).tolist()
             return self.input.open_ground(piece.window(col, row, *piece.size))
 
         is_of_reference = self.sensors is Sensors.RADARS or self.radar_name == REFERENCE

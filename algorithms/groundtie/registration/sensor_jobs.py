@@ -52,7 +52,7 @@ class GcpResult:
     mask: MaskUsed
     output: Path
     heights: str
-    survey: Survey | None = None
+    survey: Survey | None
 
     def summary(self) -> dict[str, Any]:
         """Return the result as values that JSON can carry."""

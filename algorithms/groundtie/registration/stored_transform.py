@@ -6,12 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import (
-    GeoreferencingError,
-    NoOverlapError,
-    NotRegisteredError,
-    TransformFileError,
-)
+from ..errors import GeoreferencingError, NoOverlapError, NotRegisteredError, TransformFileError
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import FloatArray, Grid, finite, require_both_or_none

@@ -53,7 +53,7 @@ class TiePointFit:
     check_rmse_px: float | None
     border_spread_px: float
     log10_chance: float | None
-    edited: int = 0
+    edited: int
 
     def lines(self) -> list[str]:
         """Return the fit as lines of text."""

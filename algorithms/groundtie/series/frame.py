@@ -15,6 +15,7 @@ from ..rasters.grid import (
     Grid,
     PointFunction,
     compose,
+    linear_part,
     mesh,
     metres_per_unit_at,
     reproject,
@@ -136,8 +137,7 @@ class SeriesFrame:
 
     def sigma_m(self, covariance: FloatArray) -> float:
         """Return `sigma_px` in metres (in pixels without georeferencing)."""
-        t = self.grid.transform
-        ground = self.metres_per_unit[:, None] * [[t.a, t.b], [t.d, t.e]]
+        ground = self.metres_per_unit[:, None] * linear_part(self.grid.transform)
         return _deviation(ground @ _spread(covariance) @ ground.T)
 
     def moved_grid(self, grid: Grid, displacement: FloatArray) -> Grid:

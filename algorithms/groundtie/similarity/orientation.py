@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch, has_negative
+from ..rasters.reading import FloatImage
 from .order_statistics import median, upper_median
 from .stacks import each, flat
-
-FloatArray = NDArray[np.floating]
 
 # Standard deviations of the Gaussian derivatives, in pixels; their surfaces are added up.
 SCALES_PX = (0.8, 1.2, 2.0)
@@ -121,7 +121,7 @@ def edge_strength(finest: NDArray[np.complex64], valid: NDArray[np.bool_]) -> Pa
     return Patch(strength, valid if valid.all() else _erode(valid, SCALES_PX[0]))
 
 
-def _differentiate(images: FloatArray, scale_px: float, gx: FloatArray, gy: FloatArray) -> None:
+def _differentiate(images: FloatImage, scale_px: float, gx: FloatImage, gy: FloatImage) -> None:
     """Write the derivatives of images, (…, h, w), along columns and along rows."""
     slope, smooth = _kernels(scale_px)
     stacks = (stack.reshape(-1, *images.shape[-2:]) for stack in (images, gx, gy))
@@ -140,12 +140,12 @@ def _kernels(scale_px: float) -> tuple[FloatArray, FloatArray]:
     return x / scale_px**2 * smooth, smooth
 
 
-def _typical(sizes: FloatArray, usable: NDArray[np.bool_]) -> FloatArray:
+def _typical(sizes: FloatImage, usable: NDArray[np.bool_]) -> FloatImage:
     """Return the median of each image's usable sizes, 1 if it has none, (…, 1, 1)."""
     if usable.all():
         return upper_median(flat(sizes))[..., None, None]
 
-    def median_of(size: FloatArray, counts: NDArray[np.bool_]) -> FloatArray:
+    def median_of(size: FloatImage, counts: NDArray[np.bool_]) -> FloatImage:
         return upper_median(size[counts] if counts.any() else np.ones(1, np.float32))
 
     return each(median_of, sizes, usable)[..., None, None]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..context import Context
 from ..memo import Memo
 from ..rasters.patch import Patch
+from ..rasters.reading import Mask
 from .correlation import MINIMUM_OVERLAP, overlap_share
 from .description import BYTES_A_PIXEL, Description
 from .measures import MEASURES
@@ -22,7 +23,6 @@ from .order_statistics import DEVIATION_PER_MAD, upper_median
 from .stacks import each, flat
 
 Surface = NDArray[np.float32]
-Known = NDArray[np.bool_]
 
 # Measures that are summed up under this name, and their weights, chosen on 14 real SAR pairs;
 # docs/measurements.md has the figures of these and of other choices.
@@ -65,7 +65,7 @@ class SimilaritySettings:
         return self.bins or int(np.clip(np.sqrt(pixels) / 7.5, 8, 32))
 
 
-def normalise(surface: Surface, known: Known | None = None) -> Surface:
+def normalise(surface: Surface, known: Mask | None = None) -> Surface:
     """Return surfaces, (…, ny, nx), in robust standard deviations from their medians (by MAD).
 
     Parameters
@@ -80,7 +80,7 @@ def normalise(surface: Surface, known: Known | None = None) -> Surface:
     return each(_normalised_where, surface, known)
 
 
-def detrend(surface: Surface, known: Known | None = None) -> Surface:
+def detrend(surface: Surface, known: Mask | None = None) -> Surface:
     """Return surfaces, (…, ny, nx), without their slow trend, normalised; see `normalise`."""
     trend = each(_smooth, surface) if known is None else each(_mean_of_known, surface, known)
     return normalise(surface - trend, known)
@@ -92,7 +92,7 @@ def _normalised(surface: Surface) -> Surface:
     return (centred / np.where(spread > _FLAT, spread, np.inf)).astype(np.float32)
 
 
-def _normalised_where(surface: Surface, known: Known) -> Surface:
+def _normalised_where(surface: Surface, known: Mask) -> Surface:
     found = np.zeros(surface.shape, np.float32)
     if known.any():
         # The known values are normalised as an image of one row.
@@ -100,7 +100,7 @@ def _normalised_where(surface: Surface, known: Known) -> Surface:
     return found
 
 
-def _mean_of_known(surface: Surface, known: Known) -> Surface:
+def _mean_of_known(surface: Surface, known: Mask) -> Surface:
     if known.all():
         return _smooth(surface)
     weight = known.astype(np.float32)
@@ -178,7 +178,7 @@ def similarity_surface(
     return normalise(total, known)
 
 
-def _standardised(values: NDArray[np.floating], known: Known | None) -> Surface:
+def _standardised(values: NDArray[np.floating], known: Mask | None) -> Surface:
     """Return the detrended sum of one or several surfaces of a measure, each normalised."""
     # A scale without valid pixels to compare has the value 0.
     parts = detrend(values, None if known is None else known & (values != 0))
