@@ -106,6 +106,14 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
+def _stripes(evidence: RegistrationEvidence) -> float:
+    """Return how much higher than usual stripes match elsewhere, if better than in their place."""
+    found = evidence.surveys.stripes
+    if found is None:
+        return math.nan
+    return found.height if found.own_height < RIVAL_HEIGHT * found.height else 0.0
+
+
 def _ground_of_cameras(evidence: RegistrationEvidence) -> float:
     """Return the height of a second place, as high, without what is dark or bright."""
     surveys = evidence.surveys.ground
@@ -159,6 +167,7 @@ def _opposite_signs(evidence: RegistrationEvidence) -> float:
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
     Statistic("part elsewhere: excess far off", LEAST_EXCESS, _of_survey(_excess_far_off)),
+    Statistic("stripes elsewhere: height", REST_PEAK_DEVIATIONS, _stripes),
     Statistic(
         "second place: share of the height",
         RIVAL_HEIGHT,

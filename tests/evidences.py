@@ -114,11 +114,14 @@ def evidence(
     unexplained: Survey | None = None,
     signs: ContrastSigns | None = None,
     far: FarPlace | None = None,
+    stripes: FarPlace | None = None,
     **more: Any,
 ) -> RegistrationEvidence:
     """Return the evidence of a registration whose check points have errors, shape (n, 2)."""
     estimate, check = estimate or estimated(fit_points()), check_points(check_errors)
-    surveys = Surveys(survey, rest, ground, unexplained=unexplained, signs=signs, far=far)
+    surveys = Surveys(
+        survey, rest, ground, unexplained=unexplained, signs=signs, far=far, stripes=stripes
+    )
     images = (more.pop("scene", scene()), more.pop("mask", MaskUsed.none("")), max_error_px)
     return RegistrationEvidence(*images, estimate, check, GRID, surveys=surveys, **more)
 

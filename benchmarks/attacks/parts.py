@@ -155,6 +155,31 @@ def jitter(pair: Pair, setting: Setting) -> Pair:
     return pair.moved(_along_rows(shift, pair.input.shape[1:]), note)
 
 
+def stripes(pair: Pair, setting: Setting) -> Pair:
+    """Narrow stripes all over are filled from another date, or are swaths of another pass."""
+    rng, shape = setting.rng, pair.input.shape[1:]
+    rows, columns = np.indices(shape)
+    angle = rng.choice([0.0, np.pi / 2]) + rng.choice([0.0, rng.uniform(-0.3, 0.3)])
+    period, share = rng.uniform(20, 90), rng.uniform(0.15, 0.4)
+    across = np.cos(angle) * rows + np.sin(angle) * columns
+    moved = across % period < share * period
+    off = direction(rng, 2 * pair.sigma_px + 5, 25.0)
+    shift = direction(rng, 0.0, _WHOLE_PX) + moved[..., None] * off
+    note = f"stripes {period:.0f} px apart, {moved.mean():.0%} off by {np.hypot(*off):.0f} px"
+    return pair.moved(shift, note)
+
+
+def bursts_of_jitter(pair: Pair, setting: Setting) -> Pair:
+    """Rows are displaced by fast vibrations that come and go."""
+    rows, rng = pair.input.shape[1], setting.rng
+    size, period = rng.uniform(5, 14), rng.uniform(30, 110)
+    noise = smooth_noise((rows, 1), rows / 8, rng)[:, 0]
+    is_burst = noise > np.quantile(noise, rng.uniform(0.3, 0.5))
+    along = size * np.sin(2 * np.pi * np.arange(rows) / period + rng.uniform(0, 6)) * is_burst
+    note = f"{is_burst.mean():.0%} of the rows by ± {size:.0f} px, period {period:.0f} px"
+    return pair.moved(_along_rows(np.column_stack([along, 0 * along]), pair.input.shape[1:]), note)
+
+
 def duplicated_rows(pair: Pair, setting: Setting) -> Pair:
     """Some rows are repeated or missing, which displaces all rows below."""
     rows, rng = pair.input.shape[1], setting.rng
@@ -213,6 +238,8 @@ ATTACKS = [
     Attack(PARTS, "strips lie off each by itself", "", own_strips),
     Attack(PARTS, "a part shows another place", "", half_of_another_place),
     Attack(PARTS, "jitter of rows", "", jitter),
+    Attack(PARTS, "stripes of another date", "", stripes),
+    Attack(PARTS, "bursts of jitter", "", bursts_of_jitter),
     Attack(PARTS, "duplicated or missing rows", "", duplicated_rows),
     Attack(PARTS, "hill", "", bulge),
     Attack(PARTS, "a part is stretched", "", stretched),

@@ -209,6 +209,10 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(38, part=11)),
         evidence(GOOD, survey=survey(46, part=2)),
     ),
+    "stripes elsewhere": (
+        evidence(GOOD, survey=survey(), stripes=FarPlace(4.0, 6.1, (0.0, 9.0))),
+        evidence(GOOD, survey=survey(), stripes=FarPlace(5.0, 6.1, (0.0, 9.0))),
+    ),
     "second place nearby": (
         evidence(GOOD, survey=survey(rival=6.5)),
         evidence(GOOD, survey=survey(rival=6.3)),

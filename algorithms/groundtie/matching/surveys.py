@@ -20,6 +20,7 @@ from .matcher import MaskOf, Places
 from .parts import MOST_OF_ONE, FarPlace, Part
 from .phase_survey import PHASES_REACH_PX, survey_unexplained
 from .shared_content import ImageKinds, Sensors, SharedContent
+from .stripes import survey_stripes
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 
 # In images that are not of two radars or one camera, windows that vary alike and edges that
@@ -76,6 +77,8 @@ class Surveys:
         Where the whole pair matches best beyond the surveys' radius; None: it is not compared,
         because one image is rendered, only ground takes part, or a pose was searched for, which is
         compared with others by itself.
+    stripes
+        Where the lines of the input that agree least match best; None: one image is rendered.
     """
 
     whole: Survey | None = None
@@ -85,6 +88,7 @@ class Surveys:
     unexplained: Survey | None = None
     signs: ContrastSigns | None = None
     far: FarPlace | None = None
+    stripes: FarPlace | None = None
 
     @property
     def parts(self) -> Sequence[Part]:
@@ -134,9 +138,10 @@ def survey_all(
     whole = search.with_far(whole, places.chip_px, kinds.open_ground)
     far = search.whole() if may_repeat else None
     signs = survey_signs(on_level, places, context.quiet()) if kinds.may_be_different else None
-    rest, unexplained = None, None
+    rest, unexplained, stripes = None, None, None
     ground: Sequence[Survey] = ()
     if sensors is not None:
+        stripes = survey_stripes(pair, places.grid, transform, elsewhere_px, context.quiet())
         part = context.part(0.4, 0.9)
         both = images, on_level
         rest = survey_rest(matcher, transform, places, accuracy_px, sensors, both, part)
@@ -149,7 +154,9 @@ def survey_all(
             ground = [survey_model(matcher, on_level, places, elsewhere_px, last, mask)]
     elif sensors is Sensors.CAMERAS:
         ground = _survey_even_ground(matcher, on_level, places, elsewhere_px, last)
-    return Surveys(whole, rest, ground, unexplained=unexplained, signs=signs, far=far)
+    return Surveys(
+        whole, rest, ground, unexplained=unexplained, signs=signs, far=far, stripes=stripes
+    )
 
 
 def _survey_even_ground(

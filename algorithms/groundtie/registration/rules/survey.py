@@ -72,6 +72,15 @@ def _part_elsewhere(evidence: RegistrationEvidence) -> str | None:
     )
 
 
+def _stripes_elsewhere(evidence: RegistrationEvidence) -> str | None:
+    found = evidence.surveys.stripes
+    if found is None or found.height < REST_PEAK_DEVIATIONS:
+        return None
+    if found.own_height >= RIVAL_HEIGHT * found.height:
+        return None
+    return f"stripes of the input match {found.distance_px:.0f} px off together"
+
+
 def _second_place_nearby(evidence: RegistrationEvidence) -> str | None:
     survey = evidence.surveys.whole
     if survey is None:
@@ -249,6 +258,17 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,
+        is_final=True,
+    ),
+    Rule(
+        "stripes elsewhere",
+        "the 30% of lines, in one of 30 directions, whose edges agree least together match more "
+        f"than {ELSEWHERE_PX:g} px off, by {REST_PEAK_DEVIATIONS:g} robust standard deviations, "
+        f"and less than {RIVAL_HEIGHT:g} times as well where the transform has them. Not asked of "
+        "rendered images",
+        "suites real, one_grid and attacks",
+        "register what is of one date or pass by itself; in a town, give a mask of the ground",
+        _stripes_elsewhere,
         is_final=True,
     ),
     Rule(
