@@ -31,6 +31,7 @@ from groundtie.registration.rules.survey import (
     MOST_NEGATIVE,
     PEAK_DEVIATIONS,
     REST_PEAK_DEVIATIONS,
+    STRIPES_IN_PLACE,
     WEAK_HEIGHT,
     deviations_elsewhere,
     deviations_of_rest,
@@ -106,12 +107,12 @@ def _share_far_off(evidence: RegistrationEvidence) -> float:
     return math.nan if far is None else far.height / max(far.own_height, 0.1)
 
 
-def _stripes(evidence: RegistrationEvidence) -> float:
-    """Return how much higher than usual stripes match elsewhere, if better than in their place."""
+def _stripes_in_place(evidence: RegistrationEvidence) -> float:
+    """Return how well stripes that match elsewhere match in their place, as a share of that."""
     found = evidence.surveys.stripes
-    if found is None:
+    if found is None or found.height < REST_PEAK_DEVIATIONS:
         return math.nan
-    return found.height if found.own_height < RIVAL_HEIGHT * found.height else 0.0
+    return found.own_height / found.height
 
 
 def _ground_of_cameras(evidence: RegistrationEvidence) -> float:
@@ -167,7 +168,7 @@ def _opposite_signs(evidence: RegistrationEvidence) -> float:
 STATISTICS = (
     Statistic("part elsewhere: excess", LEAST_EXCESS, _of_survey(_excess)),
     Statistic("part elsewhere: excess far off", LEAST_EXCESS, _of_survey(_excess_far_off)),
-    Statistic("stripes elsewhere: height", REST_PEAK_DEVIATIONS, _stripes),
+    Statistic("stripes elsewhere: in their place", STRIPES_IN_PLACE, _stripes_in_place, False),
     Statistic(
         "second place: share of the height",
         RIVAL_HEIGHT,

@@ -210,8 +210,8 @@ EVIDENCE: dict[str, tuple[Any, Any]] = {
         evidence(GOOD, survey=survey(46, part=2)),
     ),
     "stripes elsewhere": (
-        evidence(GOOD, survey=survey(), stripes=FarPlace(4.0, 6.1, (0.0, 9.0))),
-        evidence(GOOD, survey=survey(), stripes=FarPlace(5.0, 6.1, (0.0, 9.0))),
+        evidence(GOOD, survey=survey(), stripes=FarPlace(3.6, 6.1, (0.0, 9.0))),
+        evidence(GOOD, survey=survey(), stripes=FarPlace(3.8, 6.1, (0.0, 9.0))),
     ),
     "second place nearby": (
         evidence(GOOD, survey=survey(rival=6.5)),

@@ -49,6 +49,10 @@ PEAK_DEVIATIONS, REST_PEAK_DEVIATIONS = 12.0, 6.0
 # wrong ones have 10.0 and more (suites real, and margins, --classes "shadows at another hour").
 EVEN_PEAK_DEVIATIONS = 8.0
 
+# Most similarity of stripes where the transform has them, as a share of that elsewhere. Furrows
+# match a period off, too, and rows of roofs beside their ground.
+STRIPES_IN_PLACE = 0.6
+
 # Nearer than this, roofs make such peaks under correct transforms, too: with 9 px instead, a suburb
 # that is correct to 0.6 px is refused (suite attacks: images exchanged/0/sim-suburban/register/
 # 33012). Views of one camera have few such roofs; other ground that a copy was blended into has a
@@ -76,7 +80,7 @@ def _stripes_elsewhere(evidence: RegistrationEvidence) -> str | None:
     found = evidence.surveys.stripes
     if found is None or found.height < REST_PEAK_DEVIATIONS:
         return None
-    if found.own_height >= RIVAL_HEIGHT * found.height:
+    if found.own_height >= STRIPES_IN_PLACE * found.height:
         return None
     return f"stripes of the input match {found.distance_px:.0f} px off together"
 
@@ -264,8 +268,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "stripes elsewhere",
         "the 30% of lines, in one of 30 directions, whose edges agree least together match more "
         f"than {ELSEWHERE_PX:g} px off, by {REST_PEAK_DEVIATIONS:g} robust standard deviations, "
-        f"and less than {RIVAL_HEIGHT:g} times as well where the transform has them. Not asked of "
-        "rendered images",
+        f"and less than {STRIPES_IN_PLACE:g} times as well where the transform has them. Not asked "
+        "of rendered images",
         "suites real, one_grid and attacks",
         "register what is of one date or pass by itself; in a town, give a mask of the ground",
         _stripes_elsewhere,
