@@ -69,6 +69,17 @@ def test_images_that_show_nothing_have_no_stripes(context: Context) -> None:
         assert found.height == 0
 
 
+@pytest.mark.parametrize("size", [(3, 200), (200, 5), (1, 1)])
+def test_narrow_images_are_compared_too(size: tuple[int, int], context: Context) -> None:
+    def part(image: Patch, more: int) -> Patch:
+        rows, cols = (slice(side + more) for side in size)
+        return Patch(image.values[rows, cols], image.valid[rows, cols])
+
+    one, other = part(patch(1, margin=RADIUS_PX), 2 * RADIUS_PX), part(patch(2), 0)
+    found = find_stripes(one, other, RADIUS_PX, ELSEWHERE_PX, context)
+    assert found.own_height > found.height or found.height < 5
+
+
 def test_stripes_without_data_are_no_evidence(context: Context) -> None:
     """Gaps are filled with anything, here with one value, and masked."""
     image = striped(0, 40, 0.25, (9, -4))

@@ -32,8 +32,8 @@ from .survey import SURVEY_RADIUS_PX
 # over, but a reduced scene would not show those a few pixels wide.
 _PIECE_PX, _MOST_ALONG = 2 * LEVEL_SIDE_PX, 3
 
-# Directions that stripes may have, and those of them that are compared: in which the agreement of
-# lines varies most. Stripes of a real scene were always among the first eight.
+# Directions that stripes may have, and how many of them are compared: those in which the agreement
+# of lines varies most, as it does across stripes.
 _DIRECTIONS, _COMPARED = 30, 8
 
 # Share of the pixels, in the lines that agree least; stripes hold 16 to 44 % of the scenes that
@@ -43,10 +43,7 @@ _SHARE = 0.3
 # Width over which lines are averaged: single ones agree by chance.
 _WIDTH_PX = 9
 
-# Lines with a smaller share of the most content of any are too short to be compared.
-_LEAST_CONTENT = 0.1
-
-# The middle one of the scales: more stripes were found by it than by the others.
+# One scale, of middle size, is enough for sums over lines.
 _SCALE = SCALES_PX[1:2]
 
 
@@ -166,22 +163,23 @@ def _lines(shape: tuple[int, ...], angle: float) -> NDArray[np.intp]:
 def _agreement_of_lines(
     line: NDArray[np.intp], agreement: FloatArray, content: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return how much the agreement of lines varies, and the mean of each, infinite if short.
+    """Return how much the agreement of lines varies, and the mean of each, infinite if empty.
 
     By chance, directions agree and disagree alike: the variance of a product is half its square.
     """
     sums, contents = (_over_width(line, values) for values in (agreement, content))
     deviations = np.sqrt(_over_width(line, content**2 / 2, 2))
-    is_long = contents > _LEAST_CONTENT * contents.max()
+    has_content = contents > 0
     means = np.full(len(sums), np.inf)
-    np.divide(sums, contents, out=means, where=is_long)
-    return float(np.std(sums[is_long] / deviations[is_long])), means
+    np.divide(sums, contents, out=means, where=has_content)
+    return float(np.std(sums[has_content] / deviations[has_content])), means
 
 
 def _over_width(line: NDArray[np.intp], values: FloatArray, power: int = 1) -> FloatArray:
     """Return sums of values over lines, weighted over the width by a Hann window to a power."""
     weights = np.hanning(_WIDTH_PX + 2)[1:-1] ** power
-    return np.convolve(np.bincount(line.ravel(), values.ravel()), weights, "same")
+    sums = np.bincount(line.ravel(), values.ravel())
+    return np.convolve(sums, weights)[_WIDTH_PX // 2 :][: len(sums)]
 
 
 def _not_least(line: NDArray[np.intp], means: FloatArray) -> NDArray[np.bool_]:
