@@ -36,8 +36,8 @@ _PIECE_PX, _MOST_ALONG = 2 * LEVEL_SIDE_PX, 3
 # of lines varies most, as it does across stripes.
 _DIRECTIONS, _COMPARED = 30, 8
 
-# Share of the pixels, in the lines that agree least, that are compared. The gaps of Landsat 7, which
-# are filled from other dates, hold 22 %.
+# Share of the pixels, in the lines that agree least, that are compared. The gaps of Landsat 7,
+# which are filled from other dates, hold 22 %.
 _SHARE = 0.3
 
 # Width over which lines are averaged: single ones agree by chance.
