@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -115,11 +116,14 @@ class RasterMask:
         """Return which pixels of a window take part."""
         bands = tuple(replace(band, nodata=None) for band in self.mask.bands)
         mask = replace(self.mask, bands=bands, has_mask_band=False)
-        grid = self.scene.grid
-        to_mask = grid.to_pixels_of(mask.grid)
-        span = reduction(grid, to_mask, mask.grid.size)
-        kept = kept_on(
-            mask, grid.window(*window), to_mask, lambda found: ~self.values.excluded(found), span
-        )
+        grid, excluded = self.scene.grid, self.values.excluded
+        to_mask, piece = grid.to_pixels_of(mask.grid), grid.window(*window)
+        kept = kept_on(mask, piece, to_mask, lambda found: ~excluded(found), self._span)
         valid = self.scene.read(window).valid
         return Selection(valid & kept, valid)
+
+    @cached_property
+    def _span(self) -> tuple[int, int]:
+        """How many columns and rows of the mask a pixel of the image spans."""
+        grid = self.scene.grid
+        return reduction(grid, grid.to_pixels_of(self.mask.grid), self.mask.grid.size)

@@ -11,7 +11,7 @@ from ..context import Context
 from ..errors import RasterContentError
 from ..geometry.models import Model
 from ..pose.rotation_windows import DEFAULT_RADIUS_SHARE
-from ..rasters.grid import Grid, mesh
+from ..rasters.grid import Grid
 from ..rasters.held_images import held_on_level
 from ..rasters.pair import ImagePair
 from ..similarity.surface import SimilaritySettings
@@ -112,15 +112,8 @@ class FarSearch:
         if hidden is not None:
             # A part may lie at the border. The fewer pixels overlap, the higher chance reaches.
             surface = surface * np.sqrt(np.maximum(overlap(), 0))
-        shifts = mesh(*2 * [np.arange(-radius_px, radius_px + 1)])
-        distance_px = np.hypot(*shifts.T).reshape(surface.shape)
-        own = float(surface[distance_px <= SAME_PLACE_PX].max())
-        is_far = distance_px > max(beyond_px / factor, 2 * SAME_PLACE_PX)
-        at = np.argmax(np.where(is_far, surface, -np.inf))
-        if not is_far.flat[at]:
-            return FarPlace(own)
-        x, y = map(float, shifts[at] * factor)
-        return FarPlace(own, float(surface.flat[at]), (x, y))
+        beyond_px = max(beyond_px / factor, 2 * SAME_PLACE_PX)
+        return FarPlace.of(surface, SAME_PLACE_PX, beyond_px).scaled(factor)
 
 
 def _near(survey: Survey, which: NDArray[np.bool_]) -> MaskOf:

@@ -10,7 +10,7 @@ registered correctly.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from scipy.sparse.csgraph import connected_components
 from ..geometry.accuracy import NEIGHBOUR_SPACINGS
 from ..geometry.judging import RIVAL_HEIGHT, TOLERANCE_PX
 from ..rasters.grid import FloatArray, Grid, mesh
+from ..rasters.reading import Mask
+from ..similarity.surface import Surface
 from .belief_propagation import Surfaces
 
 # Chips farther from the model's prediction than the first lie elsewhere. Peaks beyond the second
@@ -57,6 +59,41 @@ class FarPlace:
     own_height: float
     height: float = 0.0
     shift_px: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def of(
+        cls, surface: Surface, own_px: float, beyond_px: float, eligible: Mask | None = None
+    ) -> FarPlace:
+        """Return the highest place of a surface that is far off; height 0 if there is none.
+
+        Parameters
+        ----------
+        surface
+            Similarity at shifts from the model's prediction, shape (2 r + 1, 2 r + 1).
+        own_px
+            Shifts up to this length are the model's own place.
+        beyond_px
+            Longer ones are far off.
+        eligible
+            Shifts that count, same shape; None: all.
+        """
+        radius_px = len(surface) // 2
+        shifts = mesh(*2 * [np.arange(-radius_px, radius_px + 1)])
+        distance_px = np.hypot(*shifts.T).reshape(surface.shape)
+        own = float(surface[distance_px <= own_px].max())
+        is_far = distance_px > beyond_px
+        if eligible is not None:
+            is_far &= eligible
+        at = np.argmax(np.where(is_far, surface, -np.inf))
+        if not is_far.flat[at]:
+            return cls(own)
+        x, y = map(float, shifts[at])
+        return cls(own, float(surface.flat[at]), (x, y))
+
+    def scaled(self, factor: float) -> FarPlace:
+        """Return the place with its shift times a factor."""
+        x, y = self.shift_px
+        return replace(self, shift_px=(x * factor, y * factor))
 
     @property
     def distance_px(self) -> float:

@@ -9,7 +9,6 @@ least are compared with the reference by themselves.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from itertools import product
 
 import cv2
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..context import Context
 from ..geometry.transform import Transform
-from ..rasters.grid import FloatArray, Grid, mesh
+from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..similarity.correlation import correlate
@@ -85,9 +84,7 @@ def _of_piece(
     level = piece.scaled(factor)
     wide = level.window(-reach, -reach, level.width + 2 * reach, level.height + 2 * reach)
     images = pair.reference_patch(wide), pair.input_patch(level, transform)
-    found = find_stripes(*images, reach, elsewhere_px / factor, context)
-    x, y = found.shift_px
-    return replace(found, shift_px=(x * factor, y * factor))
+    return find_stripes(*images, reach, elsewhere_px / factor, context).scaled(factor)
 
 
 def find_stripes(
@@ -118,18 +115,12 @@ def find_stripes(
     )
     inside = slice(radius_px, -radius_px)
     lines = _least_agreeing(searched[inside, inside], field)
-    # The least agreeing lines match there, if anywhere: the surface is that of their shifts.
-    shifts = -mesh(*2 * [np.arange(-radius_px, radius_px + 1)])
-    distance_px = np.hypot(*shifts.T).reshape(2 * radius_px + 1, -1)
 
     def compared(hidden: NDArray[np.bool_]) -> FarPlace:
         surface = normalise(correlate(np.where(hidden, 0, field), searched))
-        own = float(surface[distance_px <= elsewhere_px].max())
         is_peak = surface >= cv2.dilate(surface, np.ones((3, 3), np.uint8))
-        heights = np.where(is_peak & (distance_px > elsewhere_px), surface, 0)
-        at = int(heights.argmax())
-        x, y = map(float, shifts[at])
-        return FarPlace(own, float(heights.flat[at]), (x, y))
+        # Where the reference shows what the input's lines do: these are displaced the other way.
+        return FarPlace.of(surface, elsewhere_px, elsewhere_px, is_peak).scaled(-1)
 
     return _most_evident(context.map(compared, lines))
 
@@ -147,8 +138,10 @@ def _least_agreeing(
     content = np.sqrt((reference.real**2 + reference.imag**2) * (input.real**2 + input.imag**2))
     if not content.any():
         return []
+    # By chance, directions agree and disagree alike: the variance of a product is half its square.
+    images = agreement, content, content**2 / 2
     angles = np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS)
-    found = [_agreement_of_lines(_lines(content.shape, a), agreement, content) for a in angles]
+    found = [_agreement_of_lines(_lines(content.shape, angle), *images) for angle in angles]
     most_varied = np.argsort([varies for varies, _ in found])[: -_COMPARED - 1 : -1]
     return [_not_least(_lines(content.shape, angles[n]), found[n][1]) for n in most_varied]
 
@@ -161,14 +154,11 @@ def _lines(shape: tuple[int, ...], angle: float) -> NDArray[np.intp]:
 
 
 def _agreement_of_lines(
-    line: NDArray[np.intp], agreement: FloatArray, content: FloatArray
+    line: NDArray[np.intp], agreement: FloatArray, content: FloatArray, variance: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return how much the agreement of lines varies, and the mean of each, infinite if empty.
-
-    By chance, directions agree and disagree alike: the variance of a product is half its square.
-    """
+    """Return how much the agreement of lines varies, and the mean of each, infinite if empty."""
     sums, contents = (_over_width(line, values) for values in (agreement, content))
-    deviations = np.sqrt(_over_width(line, content**2 / 2, 2))
+    deviations = np.sqrt(_over_width(line, variance, 2))
     has_content = contents > 0
     means = np.full(len(sums), np.inf)
     np.divide(sums, contents, out=means, where=has_content)
