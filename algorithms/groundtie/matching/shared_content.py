@@ -84,7 +84,12 @@ class SharedContent:
         """
         same, are_moved = self.sameness, self.sensors is Sensors.RADARS and self.moves_as_ground
         is_ground = are_moved and same.has_one_ground and not same.covers_most
-        return self.is_exact or (same.is_marked if is_ground else same.is_evident)
+        return self.is_exact or self.is_noise or (same.is_marked if is_ground else same.is_evident)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether two radar images share a pattern of noise."""
+        return self.sensors is Sensors.RADARS and self.sameness.is_noise
 
     @property
     def is_of_cameras(self) -> bool:
@@ -129,11 +134,12 @@ class SharedContent:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether the edges cannot be those of the same ground.
+        """Whether the content cannot be that of the same ground.
 
-        Either they lie beside one another, or they coincide too sharply in images that are neither
-        copies nor views.
+        It is a pattern of noise, or its edges lie beside one another, or they coincide too sharply
+        in images that are neither copies nor views.
         """
         same = self.sameness
         is_image = self.is_explained or same.is_copy_in_other_colours
-        return same.has_edges_beside or (same.has_sharp_edges and not is_image)
+        has_drawn_edges = same.has_edges_beside or (same.has_sharp_edges and not is_image)
+        return self.is_noise or has_drawn_edges

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..rasters.patch import Patch, reduced_patch
 from ..rasters.reading import Mask
+from .coherence import coherence, spectral_products
 from .sameness import FARTHEST_PX, Edges, Windows, edges_apart_px
 from .seams import DRAWN_WIDTH, ONE_SIDED_5_PERCENT, step_width
 
@@ -86,6 +87,12 @@ LEAST_BRIGHTER = 0.8
 # Least valid share of the pixels that a pixel of a reduced image averages.
 _LEAST_VALID = 0.25
 
+# Fine structure of two radar images that share a pattern of noise is at least this coherent, and
+# more so than coarse structure. Where it is the more coherent one in radar images of one ground, it
+# is at most 0.07 (suite sharpness); of other ground with one pattern, 0.19 and more (suite attacks,
+# soft pattern noise).
+_FINE_COHERENCE = 0.12
+
 # Copies share this much, in the images and in reduced ones, so that too little is left to judge.
 _COPY_SHARE = 0.75
 
@@ -118,6 +125,8 @@ class Sameness:
     brighter
         By how many standard deviations pixels that vary alike are brighter than the others, mean of
         both images.
+    coarse_coherence, fine_coherence
+        See `coherence`.
     """
 
     sharpness: float
@@ -129,6 +138,8 @@ class Sameness:
     step_width: float = np.inf
     beside: float = 0.0
     brighter: float = 0.0
+    coarse_coherence: float = 0.0
+    fine_coherence: float = 0.0
 
     @property
     def is_evident(self) -> bool:
@@ -181,6 +192,11 @@ class Sameness:
         Averaging removes noise: it leaves ground no less alike, but common noise less.
         """
         return self.coarse_area < self.reduced_area
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether radar images share a pattern of noise, which is finer than ground."""
+        return self.fine_coherence >= max(_FINE_COHERENCE, self.coarse_coherence)
 
     @property
     def is_copy_in_other_colours(self) -> bool:
@@ -246,11 +262,14 @@ class Look:
         the same in the images, shape (4, 3).
     greys
         See `Windows.greys`.
+    spectra
+        See `spectral_products`.
     """
 
     edges: NDArray[np.int_]
     windows: NDArray[np.int_]
     greys: NDArray[np.float64]
+    spectra: NDArray[np.float64]
 
     @classmethod
     def of(cls, reference: Patch, input: Patch) -> Look:
@@ -265,7 +284,8 @@ class Look:
         coarse = [reduced_patch(patch, _FURTHER, _LEAST_VALID) for patch in smaller]
         pairs = smaller, coarse, left
         counts = np.array([whole.counts, *(Windows.of(*pair).counts for pair in pairs)])
-        return cls(_count_edges(reference, input), counts, whole.greys)
+        edges = _count_edges(reference, input)
+        return cls(edges, counts, whole.greys, spectral_products(reference, input))
 
 
 def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> Sameness:
@@ -286,6 +306,7 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
     area, reduced_area, coarse_area, _ = windows[:, 0] / np.maximum(every, 1)
     # Of the images and of reduced ones.
     related = (windows[:, 1] / np.maximum(every, 1))[:2].min()
+    coarse, fine = coherence([one.spectra for one in looks])
     return Sameness(
         float((sharp[0] - sharp[1:].mean()) / _most_of(blurred)),
         float(area),
@@ -299,6 +320,8 @@ def sameness_of(looks: Sequence[Look], steps: Sequence[NDArray[np.float64]]) -> 
             _more_of(to_half) / _most_of(sharp),
             *(_more_of(some) / _most_of(sharp + blurred) for some in beside),
         ),
+        coarse_coherence=coarse,
+        fine_coherence=fine,
     )
 
 

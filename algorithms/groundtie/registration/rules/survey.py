@@ -165,6 +165,8 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     rest = evidence.surveys.rest
     if rest is None or not rest.shared.is_evident:
         return None
+    if rest.shared.is_noise:
+        return "both radar images have the same pattern of noise, finer than ground"
     if rest.shared.is_drawn:
         return "both images have the same drawn edges, sharper than the ground's or side by side"
     left = rest.survey
@@ -313,12 +315,13 @@ SURVEY_RULES: tuple[Rule, ...] = (
     Rule(
         "pixel-locked content",
         "both images have the same content, pixel by pixel, such as labels or clouds. Its edges "
-        "are sharper than edges of the ground, or lie beside one another. Or, without it, less "
-        "than a quarter of the chips is left, their mean similarity is below "
-        f"{WEAK_HEIGHT:g} robust standard deviations, or a second place matches about as well or "
-        f"is a peak of {REST_PEAK_DEVIATIONS:g}. Copies and views of one camera are refused only "
-        "if edges are sharp, and a quarter of the chips is left that is as weak or has such a "
-        "place. Camera images that are displaced as ground is, by more than "
+        "are sharper than edges of the ground, or lie beside one another. Or it is a pattern of "
+        "noise in two radar images, whose fine structure is more coherent than their coarse "
+        "structure. Or, without it, less than a quarter of the chips is left, their mean "
+        f"similarity is below {WEAK_HEIGHT:g} robust standard deviations, or a second place "
+        f"matches about as well or is a peak of {REST_PEAK_DEVIATIONS:g}. Copies and views of one "
+        "camera are refused only if edges are sharp, and a quarter of the chips is left that is as "
+        "weak or has such a place. Camera images that are displaced as ground is, by more than "
         f"{NOMINAL_PX:g} px on the map and {WHOLE_TIMES_EXACT * EXACT_PX:g} px from whole pixels, "
         f"may have sharp edges if {MOVED_GROUND_SHARE:.0%} of the rest varies alike",
         "suites margins and attacks",
