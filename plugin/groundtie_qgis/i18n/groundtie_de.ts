@@ -644,6 +644,10 @@
       <translation>Höhen eines anderen Geoids über dem Ellipsoid, statt eines Höhenbezugs mit Namen.</translation>
     </message>
     <message>
+      <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres.</source>
+      <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern.</translation>
+    </message>
+    <message>
       <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres. Only ground that both images show takes part: no layover, radar shadow, relief displacement or cast shadow. Needs the views of both images.</source>
       <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern. Nur Boden, den beide Bilder zeigen, nimmt teil: kein Layover, Radarschatten, Reliefversatz oder Schlagschatten. Braucht die Blickrichtungen beider Bilder.</translation>
     </message>
