@@ -129,8 +129,13 @@ class Raster:
         ImportError
             rioxarray is not installed.
         """
-        import rioxarray  # noqa: F401 (gives arrays their accessor)
-        import xarray
+        try:
+            import rioxarray  # noqa: F401 (gives arrays their accessor)
+            import xarray
+        except ImportError as error:
+            raise ImportError(
+                "a DataArray needs rioxarray: pip install 'groundtie[xarray]'"
+            ) from error
 
         values = self.values
         if isinstance(values, np.ma.MaskedArray):

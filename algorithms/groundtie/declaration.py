@@ -207,7 +207,10 @@ def tool(
 
         @functools.wraps(function)
         def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-            bound = signature.bind(*args, **kwargs).arguments
+            try:
+                bound = signature.bind(*args, **kwargs).arguments
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}() {error}") from None
             through = {key: bound.pop(key) for key in HANDED_THROUGH if key in bound}
             values = declared.check(bound, in_python=True)
             given = {"parameters": values} if "parameters" in signature.parameters else {}

@@ -147,6 +147,7 @@ def test_lines_tell_what_did_not_end_well(table: Path) -> None:
     assert lines[0] == "23 rows: 1 done, 22 refused, 0 failed"
     assert lines[1] == "row 2 (02) refused: refused: too few points agree"
     assert lines[-2] == "… and 2 more"
+    assert run(table, {}).lines()[0].startswith("1 row: 1 done")
 
 
 class TestResume:

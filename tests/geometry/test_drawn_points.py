@@ -182,6 +182,17 @@ def test_a_start_that_has_no_place_in_the_image_is_refused(tmp_path: Path) -> No
         read_tie_points(tmp_path / "a.gpkg", PLAIN)
 
 
+def test_a_drawn_line_may_have_no_properties(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    points = write(path)
+    collection = json.loads(path.read_text())
+    drawn = {"type": "Feature", "geometry": collection["features"][0]["geometry"]}
+    collection["features"] += [drawn | {"properties": None}, drawn]
+    path.write_text(json.dumps(collection))
+    found = read_tie_points(path, GRID)
+    np.testing.assert_allclose(found.reference_xy[-2:], points.reference_xy[[0, 0]], atol=0.1)
+
+
 def test_a_line_of_several_parts_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.geojson"
     write(path)

@@ -37,7 +37,7 @@ def test_noise_has_no_part(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lower", "left", "where"), [(3, 7, "lower"), (0, 3, "left"), (2, 4, "lower left")]
+    ("lower", "left", "where"), [(3, 7, "bottom"), (0, 3, "left side"), (2, 4, "lower left")]
 )
 def test_a_part_is_found_though_no_chip_of_it_stands_out(lower: int, left: int, where: str) -> None:
     """Each chip is raised by less than the highest noise; together they are evident."""

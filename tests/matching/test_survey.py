@@ -90,12 +90,12 @@ def test_chips_of_another_place_confirm_nothing(tmp_path: Path, context: Context
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("shift", "where"), [((9, -6), "left"), ((-14, 11), "upper right")])
+@pytest.mark.parametrize(("shift", "where"), [((9, -6), "left side"), ((-14, 11), "upper right")])
 def test_a_part_that_lies_elsewhere_is_found_with_its_place(
     tmp_path: Path, context: Context, shift: tuple[int, int], where: str
 ) -> None:
     input, moved = noisy(place(), 2), noisy(place(shift), 2)
-    part = np.s_[:, : SIDE // 3] if where == "left" else np.s_[: SIDE // 2, SIDE // 2 :]
+    part = np.s_[:, : SIDE // 3] if where == "left side" else np.s_[: SIDE // 2, SIDE // 2 :]
     input[part] = moved[part]
     survey = surveyed(tmp_path, noisy(place(), 1), input, context)
     found = survey.parts[0]

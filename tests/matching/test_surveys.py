@@ -109,7 +109,7 @@ def test_a_part_beyond_the_radius_is_found(
     assert found.whole is not None
     part = found.whole.parts[0]
     assert part.shift_px == pytest.approx(off, abs=1.5)
-    assert part.where == "lower"
+    assert part.where == "bottom"
     # Chips on the seam line may match either side.
     assert part.chips == pytest.approx(len(found.whole.centres) / 3, rel=0.35)
 

@@ -432,3 +432,9 @@ def test_a_crs_without_a_map_is_refused_as_that_of_a_file_is(crs: str) -> None:
     values = np.zeros((20, 30), np.uint8)
     with pytest.raises(GeoreferencingError):
         open_raster(Raster(values, Affine.scale(10, -10), crs))
+
+
+def test_without_rioxarray_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rioxarray", None)
+    with pytest.raises(ImportError, match=r"pip install 'groundtie\[xarray\]'"):
+        Raster(np.zeros((4, 4))).to_xarray()

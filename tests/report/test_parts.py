@@ -21,7 +21,7 @@ TWO_ROWS = survey(35, part=14)
 
 def test_a_part_is_named_by_place_distance_and_direction() -> None:
     (line,) = parts.lines(TWO_ROWS)
-    assert line.startswith("upper: 14 chips lie 10.3 px off (90.0 m east, 50.0 m north)")
+    assert line.startswith("top: 14 chips lie 10.3 px off (90.0 m east, 50.0 m north)")
     assert line.endswith("; 0 of them confirm the transform")
 
 
@@ -44,7 +44,7 @@ def test_coverage_names_where_most_hardly_matches() -> None:
     assert parts.counts(TWO_ROWS) == {"chips": 49, "confirming": 35, "hardly_matching": 14}
     assert parts.coverage(TWO_ROWS) == (
         "35 of 49 chips confirm the transform, 14 hardly match, 14 of them side by side "
-        "around the upper"
+        "around the top"
     )
     assert parts.coverage(survey(49)) == "49 of 49 chips confirm the transform, 0 hardly match"
 
@@ -74,6 +74,6 @@ def test_without_parts_the_map_has_no_arrows() -> None:
 def test_a_page_shows_parts_whatever_the_verdict(pair: ImagePair, tmp_path: Path) -> None:
     page: Page = written(report_of(pair, survey=TWO_ROWS), tmp_path)
     assert "Parts that lie elsewhere" in [e.text for e in page.all("h2")]
-    assert "Upper: 14 chips lie 10.3 px off" in page.text
+    assert "Top: 14 chips lie 10.3 px off" in page.text
     without = written(report_of(pair, survey=survey(49)), tmp_path)
     assert "Parts that lie elsewhere" not in [e.text for e in without.all("h2")]

@@ -275,7 +275,7 @@ def test_figures_of_errors(page: Page) -> None:
     assert any("a circle that holds 90 % of them" in a for a in alts)
     # The figures reach to 3 px; one check point is 12.5 px off.
     assert "the 9 check points that were matched" in page.text
-    assert "1 more than 3.0 px are not shown" in page.text
+    assert "Not in either figure: 1 of more than 3.0 px." in page.text
 
 
 def test_surfaces_show_their_peaks(page: Page) -> None:

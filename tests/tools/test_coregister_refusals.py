@@ -94,6 +94,8 @@ def test_a_refusal_on_the_command_line(
     assert "input.tif was not registered to" in printed.err
     assert json.loads(printed.out)["verdict"]["accepted"] is False
     assert set(listing(tmp_path)) - set(before) == {"report.html", "report.json"}
+    title = "<title>Refused: input.tif not registered to reference.tif</title>"
+    assert title in (tmp_path / "report.html").read_text()
     numbers = json.loads((tmp_path / "report.json").read_text())
     assert numbers["verdict"] == json.loads(printed.out)["verdict"]
     assert numbers["verdict"]["reason"] in printed.err

@@ -249,7 +249,8 @@ def test_summary_and_lines_say_the_same(
     result, _ = estimated
     assert result.pose.rotation_deg == pytest.approx(told["rotation_deg"])
     text = "\n".join(result.lines())
-    assert f"{told['rotation_deg']:+.2f}°" in text
+    sense = "anticlockwise" if told["rotation_deg"] > 0 else "clockwise"
+    assert f"rotation: {abs(told['rotation_deg']):.2f}° {sense}\n" in text
     assert f"{told['scale']:.4f}" in text
     assert cv2.imread(str(picture)) is not None
 

@@ -69,3 +69,8 @@ def test_a_reference_without_a_view_is_refused(city: Path, tmp_path: Path) -> No
     with pytest.raises(ParameterError, match="view of the reference is not known"):
         groundtie.mask_surface(alone, city / "dsm.tif", tmp_path / "mask.tif")
     assert not (tmp_path / "mask.tif").exists()
+
+
+def test_help_does_not_ask_for_both_views() -> None:
+    """One view is enough: see `test_without_the_other_view_only_the_references_own_is_masked`."""
+    assert "Needs the views of both images" not in (groundtie.mask_surface.__doc__ or "")

@@ -93,7 +93,7 @@ def test_a_terrain_model_of_a_part_serves_for_matching_that_part(
         dem_datum="ellipsoidal",
         model="shift_drift",
     )
-    assert "part.tif above ellipsoidal, which covers" in result.ground
+    assert "part.tif above the ellipsoid, which covers" in result.ground
     # As processes give results back.
     assert pickle.loads(pickle.dumps(result)).lines() == result.lines()
     assert scene.error_px(read_rpc(tmp_path / "refined_RPC.TXT")) < 1.0

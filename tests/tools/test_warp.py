@@ -414,9 +414,10 @@ def test_edited_lines_are_told(tmp_path: Path) -> None:
     path = misregistered(tmp_path / "a.tif")
     points = stored(tmp_path / "t.geojson")
     collection = json.loads(points.read_text())
-    for feature in collection["features"][:4]:
-        feature["geometry"]["coordinates"][1][0] += 1e-3
-    points.write_text(json.dumps(collection))
-    result = warp(path, tmp_path / "out.tif", points)
-    assert "edited by hand: 4 points; of lines the ends count, not the columns" in result.lines()
-    assert result.summary()["tie_points"]["edited"] == 4
+    for count, told in ((1, "1 point"), (4, "4 points")):
+        for feature in collection["features"][:count]:
+            feature["geometry"]["coordinates"][1][0] += 1e-3
+        points.write_text(json.dumps(collection))
+        result = warp(path, tmp_path / "out.tif", points)
+        assert f"edited by hand: {told}; of lines the ends count, not the columns" in result.lines()
+        assert result.summary()["tie_points"]["edited"] == count

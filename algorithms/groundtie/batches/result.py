@@ -107,7 +107,8 @@ class BatchResult:
         counts = [f"{count} {status}" for status, count in self.counts.items()]
         counts += [f"{self.resumed} of them in an earlier run"] if self.resumed else []
         bad = [row for row in self.rows if row.outcome.status != DONE]
-        lines = [f"{len(self.rows)} rows: {', '.join(counts)}"]
+        rows = "1 row" if len(self.rows) == 1 else f"{len(self.rows)} rows"
+        lines = [f"{rows}: {', '.join(counts)}"]
         lines += [
             f"row {row.call.row} ({row.call.name}) {row.outcome.status}: {row.outcome.message}"
             for row in bad[:_LINES]

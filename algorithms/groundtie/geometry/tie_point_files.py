@@ -200,7 +200,8 @@ def _read_rows(path: Path, suffix: str) -> tuple[list[Row], FloatArray, CRS | No
     if suffix == ".geojson":
         collection = read_json(path)
         features = collection["features"]
-        rows = [dict(feature["properties"]) for feature in features]
+        # Properties may be null (RFC 7946, section 3.2).
+        rows = [dict(feature.get("properties") or {}) for feature in features]
         ends = line_ends([feature.get("geometry") for feature in features])
         # Older than RFC 7946, but QGIS writes it.
         named = collection.get("crs")

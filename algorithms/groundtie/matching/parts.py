@@ -41,7 +41,11 @@ MOST_OF_ONE = 7.0
 # A far place must exceed the model's own by as much.
 LEAST_EXCESS = MOST_OF_ONE
 
-_ROWS, _COLUMNS = ("upper", "", "lower"), ("left", "", "right")
+_PLACES = (
+    ("upper left", "top", "upper right"),
+    ("left side", "middle", "right side"),
+    ("lower left", "bottom", "lower right"),
+)
 
 
 @dataclass(frozen=True)
@@ -263,4 +267,4 @@ def _limited(surfaces: Surfaces) -> Surfaces:
 def place_in_words(grid: Grid, px: FloatArray) -> str:
     """Return the name of the thirds of a grid, along both axes, that hold a position (col, row)."""
     col, row = (min(int(3 * at / side), 2) for at, side in zip(px, grid.size, strict=True))
-    return " ".join(filter(None, (_ROWS[row], _COLUMNS[col]))) or "middle"
+    return _PLACES[row][col]

@@ -283,9 +283,10 @@ class Registration:
     def page(self) -> Report:
         """Return the report."""
         names = [file_name(image.source.path) for image in (self.pair.input, self.pair.reference)]
+        done = "registered to" if self.verdict.accepted else "not registered to"
         return Report(
             self,
-            title=f"{names[0]} registered to {names[1]}",
+            title=f"{names[0]} {done} {names[1]}",
             parameters=self.parameters,
             seconds=time.perf_counter() - self.started,
         )

@@ -13,7 +13,7 @@ from ..errors import NoOverlapError, ParameterError
 from ..progress import Progress
 from ..rasters.grid import Grid
 from ..rasters.reading import RasterSource, open_raster
-from ..sensor.geoids import DATUMS, declared_datum, find_geoid
+from ..sensor.geoids import DATUMS, ELLIPSOIDAL, declared_datum, find_geoid
 from ..sensor.orientation import Orientation, orient, seen_at
 from ..sensor.rpc import RPC, VALID_RANGE
 from ..sensor.rpc_files import rpc_of
@@ -65,7 +65,8 @@ class Ground:
             partly = "" if share == 1 else f", which covers {_percent(share)} of the image"
             has_voids = filled >= _LEAST_FILLED
             voids = f"; {_percent(filled)} are voids that are filled" if has_voids else ""
-            return f"heights of {self.dem} above {self.datum or self.geoid}{partly}{voids}"
+            above = "the ellipsoid" if self.datum == ELLIPSOIDAL else self.datum or self.geoid
+            return f"heights of {self.dem} above {above}{partly}{voids}"
         height = orientation.rpc.offset[2] if self.height_m is None else self.height_m
         return f"no terrain model: the height is {height:g} m above the ellipsoid everywhere"
 

@@ -65,9 +65,8 @@ class TiePointFit:
             error = f"{self.check_rmse_px:.2f} px (RMSE)"
             lines.append(f"error at {self.check_points} check points: {error}")
         if self.edited:
-            lines.append(
-                f"edited by hand: {self.edited} points; of lines the ends count, not the columns"
-            )
+            edited = "1 point" if self.edited == 1 else f"{self.edited} points"
+            lines.append(f"edited by hand: {edited}; of lines the ends count, not the columns")
         return lines
 
 

@@ -62,11 +62,8 @@ class Correction:
         if self.centre_m is not None:
             in_metres = f" ({self.centre_m:.1f} m)"
         direction = f": {self.direction}" if self.direction else ""
-        rotated = "not rotated"
-        # visible in two decimals
-        if abs(self.rotation_deg) >= 0.005:
-            sense = "anticlockwise" if self.rotation_deg > 0 else "clockwise"
-            rotated = f"rotated by {abs(self.rotation_deg):.2f}° {sense}"
+        turn = turn_in_words(self.rotation_deg)
+        rotated = f"rotated by {turn}" if turn else "not rotated"
         least, most = f"{self.least_px:.1f}", f"{self.most_px:.1f}"
         over = "the same" if least == most else f"by {least} to {most} px"
         return (
@@ -77,6 +74,13 @@ class Correction:
     def summary(self) -> dict[str, Any]:
         """Return the correction as JSON values."""
         return {name: value for name, value in vars(self).items() if name != "centre_m"}
+
+
+def turn_in_words(rotation_deg: float) -> str:
+    """Return a rotation (positive: anticlockwise) as "0.09° clockwise"; "" below 0.005°."""
+    if abs(rotation_deg) < 0.005:
+        return ""
+    return f"{abs(rotation_deg):.2f}° {'anticlockwise' if rotation_deg > 0 else 'clockwise'}"
 
 
 def _turn(nominal: NDArray[np.float64], xy: NDArray[np.float64], grid: Grid) -> tuple[float, float]:

@@ -32,6 +32,8 @@ DISTORTIONS = {
 _NODE_SPACING_PX = 64
 _MIN_NODES = 8
 _SPLINE_REACH_PX = 4
+# In units of half the longer side.
+_LARGEST_WARP = 0.1
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,12 @@ def draw_misregistration(options: DistortionOptions, grid: Grid, seed: int) -> P
     azimuth = generator.uniform(0, 2 * math.pi)
     coefficients[0] = options.shift_px * px * np.array([math.cos(azimuth), math.sin(azimuth)])
     if kind in ("affine", "polynomial3"):
+        # A warp that folds the plane has no inverse; the limit stays far from that.
+        if options.warp_px * px > _LARGEST_WARP:
+            raise ParameterError(
+                "warp must be at most a twentieth of the input's longer side: "
+                f"{options.warp_px:g} px are more than {_LARGEST_WARP / px:g} px"
+            )
         coefficients[1:] = _drawn_warp(generator, terms - 1, DEGREE[kind], options.warp_px * px)
     elif kind != "translation":
         factor = 1.0 if options.kind == "rotation" else options.scale
@@ -107,9 +115,6 @@ def _drawn_warp(
     generator: np.random.Generator, terms: int, degree: int, largest: float
 ) -> npt.NDArray[np.float64]:
     """Draw non-constant coefficients with a displacement of at most `largest` in the frame."""
-    # A warp that folds the plane has no inverse; the limit stays far from that.
-    if largest > 0.1:
-        raise ParameterError("warp must be less than a twentieth of the input's longer side")
     drawn = generator.uniform(-1, 1, (terms, 2))
     side = np.linspace(-1, 1, 41)
     displacement = monomials(mesh(side, side), degree)[:, 1:] @ drawn

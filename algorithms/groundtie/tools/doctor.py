@@ -16,9 +16,9 @@ def doctor(progress: Progress = SILENT) -> Installation:
     """State what is installed, what is missing, and what cannot run therefore.
 
     Python packages are imported and their versions compared with those that are needed; GDAL's
-    formats, PROJ's data and the grids of the geoids EGM96 and EGM2008 are tried. What is marked as
-    not here is needed by what its line names alone; what is marked as missing makes the exit code
-    2. Put these lines into a report of a bug.
+    formats, PROJ's data and the grids of the geoids EGM96 and EGM2008 are tried. If something
+    is marked as not here, only what its line names cannot run. If something is marked as missing,
+    the exit code is 2. Put these lines into a report of a bug.
     """
     progress.update(0.0, "importing packages")
     return examine()

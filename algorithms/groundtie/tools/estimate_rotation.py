@@ -20,6 +20,7 @@ from ..rasters.pair import Image
 from ..rasters.reading import open_raster
 from ..registration.pose_verdict import PoseEvidence, confirm_pose
 from ..registration.verdict import Verdict, decide
+from ..report.correction import turn_in_words
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
@@ -76,7 +77,7 @@ class RotationResult:
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
         return [
-            f"rotation: {self.pose.rotation_deg:+.2f}° (counter-clockwise)",
+            f"rotation: {turn_in_words(self.pose.rotation_deg) or 'none'}",
             f"scale: {self.pose.scale:.4f}",
             f"shift: {self.right:+.2f} {self.unit} right, {self.down:+.2f} {self.unit} down",
             f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "

@@ -30,7 +30,15 @@ from .results import SHARE_OUTPUT, WrittenMask
 )
 def mask_surface(
     reference: general.Reference,
-    surface_model: Annotated[Path, replace(registration.SURFACE_MODEL, advanced=False)],
+    surface_model: Annotated[
+        Path,
+        replace(
+            registration.SURFACE_MODEL,
+            help="Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with "
+            "a field height in metres.",
+            advanced=False,
+        ),
+    ],
     output: general.MaskOut,
     reasons: Annotated[
         Path | None,

@@ -38,9 +38,10 @@ def register(
 
     Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical
     and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and
-    scale are searched for. An image with RPCs has them refined, and is orthorectified, by a
-    terrain model if one is given; what wrong heights displace another one by is taken out by it, if
-    the points justify that. The result names what was tried, and why; the probability of
-    agreement by chance counts all of it. A refused registration writes no image.
+    scale are searched for. If the input has RPCs, they are refined and the input is
+    orthorectified, with the terrain model if one is given. For other inputs, the terrain model
+    serves to remove displacements by wrong heights, if the points justify that. The result names
+    what was tried, and why; the probability of agreement by chance counts all of it. A refused
+    registration writes no image.
     """
     return register_anything(parameters, progress)

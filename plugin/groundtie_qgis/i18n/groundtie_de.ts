@@ -644,6 +644,10 @@
       <translation>Höhen eines anderen Geoids über dem Ellipsoid, statt eines Höhenbezugs mit Namen.</translation>
     </message>
     <message>
+      <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres.</source>
+      <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern.</translation>
+    </message>
+    <message>
       <source>Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field height in metres. Only ground that both images show takes part: no layover, radar shadow, relief displacement or cast shadow. Needs the views of both images.</source>
       <translation>Höhen von Dächern, Baumkronen und Boden (DSM), oder ein Vektorlayer von Gebäuden mit einem Feld height in Metern. Nur Boden, den beide Bilder zeigen, nimmt teil: kein Layover, Radarschatten, Reliefversatz oder Schlagschatten. Braucht die Blickrichtungen beider Bilder.</translation>
     </message>
@@ -1264,8 +1268,8 @@
       <translation>Eine Marke an ihre Stelle auf der Referenz ziehen, oder das andere Ende einer Linie.</translation>
     </message>
     <message>
-      <source>Python packages are imported and their versions compared with those that are needed; GDAL's formats, PROJ's data and the grids of the geoids EGM96 and EGM2008 are tried. What is marked as not here is needed by what its line names alone; what is marked as missing makes the exit code 2. Put these lines into a report of a bug.</source>
-      <translation>Python-Pakete werden importiert und ihre Versionen mit den nötigen verglichen; GDALs Formate, PROJs Daten und die Gitter der Geoide EGM96 und EGM2008 werden probiert. Was als nicht da (not here) bezeichnet ist, braucht nur, was seine Zeile nennt; was als fehlend (missing) bezeichnet ist, macht den Rückgabewert zu 2. Diese Zeilen gehören in jede Fehlermeldung.</translation>
+      <source>Python packages are imported and their versions compared with those that are needed; GDAL's formats, PROJ's data and the grids of the geoids EGM96 and EGM2008 are tried. If something is marked as not here, only what its line names cannot run. If something is marked as missing, the exit code is 2. Put these lines into a report of a bug.</source>
+      <translation>Python-Pakete werden importiert und ihre Versionen mit den nötigen verglichen; GDALs Formate, PROJs Daten und die Gitter der Geoide EGM96 und EGM2008 werden probiert. Ist etwas als nicht da (not here) bezeichnet, so läuft nur das nicht, was seine Zeile nennt. Ist etwas als fehlend (missing) bezeichnet, so ist der Rückgabewert 2. Diese Zeilen gehören in jede Fehlermeldung.</translation>
     </message>
     <message>
       <source>Python packages are missing: Raster &gt; GroundTie &gt; Install what is missing</source>
@@ -1308,8 +1312,8 @@
       <translation>Radarbild</translation>
     </message>
     <message>
-      <source>Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and scale are searched for. An image with RPCs has them refined, and is orthorectified, by a terrain model if one is given; what wrong heights displace another one by is taken out by it, if the points justify that. The result names what was tried, and why; the probability of agreement by chance counts all of it. A refused registration writes no image.</source>
-      <translation>Radarbilder, Kamerabilder und Paare aus beiden werden zugeordnet wie von match_sar_sar, match_optical und `coregister`; wird das abgelehnt, wird ein anderer sinnvoller Weg versucht und nach Drehung und Maßstab gesucht. Hat ein Bild RPCs, werden sie verbessert, und es wird orthorektifiziert, mit einem Geländemodell, wenn eines angegeben ist; worum falsche Höhen ein anderes Bild versetzen, wird damit herausgenommen, wenn die Punkte das rechtfertigen. Das Ergebnis nennt, was versucht wurde und warum; die Wahrscheinlichkeit zufälliger Übereinstimmung zählt alles davon. Eine abgelehnte Registrierung schreibt kein Bild.</translation>
+      <source>Radar images, a camera's images and pairs of both are matched as match_sar_sar, match_optical and `coregister` do; if that is refused, another way that makes sense is tried, and rotation and scale are searched for. If the input has RPCs, they are refined and the input is orthorectified, with the terrain model if one is given. For other inputs, the terrain model serves to remove displacements by wrong heights, if the points justify that. The result names what was tried, and why; the probability of agreement by chance counts all of it. A refused registration writes no image.</source>
+      <translation>Radarbilder, Kamerabilder und Paare aus beiden werden zugeordnet wie von match_sar_sar, match_optical und `coregister`; wird das abgelehnt, wird ein anderer sinnvoller Weg versucht und nach Drehung und Maßstab gesucht. Hat die Eingabe RPCs, werden sie verbessert, und sie wird orthorektifiziert, mit dem Geländemodell, wenn eines angegeben ist. Bei anderen Eingaben dient das Geländemodell dazu, Versatz durch falsche Höhen zu entfernen, wenn die Punkte das rechtfertigen. Das Ergebnis nennt, was versucht wurde und warum; die Wahrscheinlichkeit zufälliger Übereinstimmung zählt alles davon. Eine abgelehnte Registrierung schreibt kein Bild.</translation>
     </message>
     <message>
       <source>Radon</source>
