@@ -41,7 +41,7 @@ from groundtie.registration.rules.survey import (
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
-from groundtie.similarity.in_common import LEAST_BRIGHTER, MOVED_GROUND_SHARE
+from groundtie.similarity.in_common import FINE_COHERENCE, LEAST_BRIGHTER, MOVED_GROUND_SHARE
 
 from .accuracy import SILENTLY_WRONG_PX
 from .attacks.cases import AttackCase
@@ -145,6 +145,15 @@ def _moved_ground(evidence: RegistrationEvidence) -> float:
     return rest.shared.sameness.ground if rest is not None and is_moved else math.nan
 
 
+def _fine_coherence(evidence: RegistrationEvidence) -> float:
+    """Return the coherence of fine structure if it exceeds that of coarse structure, else 0."""
+    rest = evidence.surveys.rest
+    if rest is None or rest.shared.sensors is Sensors.CAMERAS:
+        return math.nan
+    same = rest.shared.sameness
+    return same.fine_coherence if same.fine_coherence > same.coarse_coherence else 0.0
+
+
 def _height_of_else(evidence: RegistrationEvidence) -> float:
     height = height_of_else(evidence.surveys.rest)
     return height if math.isfinite(height) else math.nan
@@ -194,6 +203,7 @@ STATISTICS = (
         lambda evidence: deviations_of_unexplained(evidence.surveys),
     ),
     Statistic("one sign of contrast: negative", MOST_NEGATIVE, _opposite_signs, False),
+    Statistic("pixel-locked content: fine coherence", FINE_COHERENCE, _fine_coherence),
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
     Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),

@@ -148,3 +148,15 @@ def test_cameras_images_are_alike_in_coarse_pixels(
     sameness = replace(ONE_GROUND, ground=0.1, reduced_area=reduced, coarse_area=coarse)
     assert SharedContent(sameness, Sensors.CAMERAS).is_of_cameras == is_of_cameras
     assert not SharedContent(sameness, Sensors.DIFFERENT).is_of_cameras
+
+
+@pytest.mark.parametrize(("coarse", "fine", "is_noise"), [(0.1, 0.2, True), (0.3, 0.2, False)])
+def test_a_pattern_of_noise_is_drawn_over_radar_images(
+    coarse: float, fine: float, is_noise: bool
+) -> None:
+    """Fine structure of camera images may be the more coherent: light and seasons are coarse."""
+    sameness = replace(ONE_GROUND, area=0.1, coarse_coherence=coarse, fine_coherence=fine)
+    for sensors in (Sensors.RADARS, Sensors.DIFFERENT):
+        shared = SharedContent(sameness, sensors, off_drawn=2.0)
+        assert [shared.is_noise, shared.is_drawn, shared.is_evident] == [is_noise] * 3
+    assert not SharedContent(sameness, Sensors.CAMERAS).is_noise

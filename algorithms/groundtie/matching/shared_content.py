@@ -88,8 +88,8 @@ class SharedContent:
 
     @property
     def is_noise(self) -> bool:
-        """Whether two radar images share a pattern of noise."""
-        return self.sensors is Sensors.RADARS and self.sameness.is_noise
+        """Whether the images share a pattern of noise; coarse structure of camera images varies."""
+        return self.sensors is not Sensors.CAMERAS and self.sameness.is_noise
 
     @property
     def is_of_cameras(self) -> bool:

@@ -87,11 +87,11 @@ LEAST_BRIGHTER = 0.8
 # Least valid share of the pixels that a pixel of a reduced image averages.
 _LEAST_VALID = 0.25
 
-# Fine structure of two radar images that share a pattern of noise is at least this coherent, and
-# more so than coarse structure. Where it is the more coherent one in radar images of one ground, it
-# is at most 0.07 (suite sharpness); of other ground with one pattern, 0.19 and more (suite attacks,
-# soft pattern noise).
-_FINE_COHERENCE = 0.12
+# Fine structure of images that share a pattern of noise, one of them a radar's, is at least this
+# coherent, and more so than coarse structure. Where it is the more coherent one in images of one
+# ground, it is at most 0.1 (suite sharpness), of other ground with one pattern mostly 0.19 and more
+# (suite sharpness, patterns of noise).
+FINE_COHERENCE = 0.15
 
 # Copies share this much, in the images and in reduced ones, so that too little is left to judge.
 _COPY_SHARE = 0.75
@@ -195,8 +195,8 @@ class Sameness:
 
     @property
     def is_noise(self) -> bool:
-        """Whether radar images share a pattern of noise, which is finer than ground."""
-        return self.fine_coherence >= max(_FINE_COHERENCE, self.coarse_coherence)
+        """Whether images, one of them a radar's, share a pattern of noise, finer than ground."""
+        return self.fine_coherence >= max(FINE_COHERENCE, self.coarse_coherence)
 
     @property
     def is_copy_in_other_colours(self) -> bool:

@@ -166,7 +166,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None or not rest.shared.is_evident:
         return None
     if rest.shared.is_noise:
-        return "both radar images have the same pattern of noise, finer than ground"
+        return "both images have the same pattern of noise, finer than ground"
     if rest.shared.is_drawn:
         return "both images have the same drawn edges, sharper than the ground's or side by side"
     left = rest.survey
@@ -223,12 +223,14 @@ def height_of_else(rest: Rest | None) -> float:
     """Return the mean similarity of chips without the content that both images share.
 
     Of the surveys without shared windows and without shared edges, the higher; of what may be
-    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made or both
-    images are a radar's.
+    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made, or if both
+    images are a radar's, unless it may be clouds.
     """
-    if rest is None or rest.shared.is_evident or rest.shared.sensors is Sensors.RADARS:
+    if rest is None or rest.shared.is_evident:
         return math.inf
     is_soft = rest.shared.sameness.may_be_clouds
+    if rest.shared.sensors is Sensors.RADARS and not is_soft:
+        return math.inf
     ways = (rest.survey,) if is_soft else (rest.survey, rest.without_edges)
     heights = [left.height for left in ways if left is not None]
     return max(heights, default=math.inf)
@@ -316,8 +318,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "pixel-locked content",
         "both images have the same content, pixel by pixel, such as labels or clouds. Its edges "
         "are sharper than edges of the ground, or lie beside one another. Or it is a pattern of "
-        "noise in two radar images, whose fine structure is more coherent than their coarse "
-        "structure. Or, without it, less than a quarter of the chips is left, their mean "
+        "noise in a radar image and another one, whose fine structure is more coherent than their "
+        "coarse structure. Or, without it, less than a quarter of the chips is left, their mean "
         f"similarity is below {WEAK_HEIGHT:g} robust standard deviations, or a second place "
         f"matches about as well or is a peak of {REST_PEAK_DEVIATIONS:g}. Copies and views of one "
         "camera are refused only if edges are sharp, and a quarter of the chips is left that is as "
@@ -373,8 +375,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
         "vary alike and without the surroundings of edges that coincide; if what varies alike is "
         f"brighter by {LEAST_BRIGHTER:g} standard deviations, as clouds are, without these windows "
-        f"alone. Asked {UNMASKED}, and not of two radar images, or of copies and views of one "
-        "camera",
+        f"alone. Asked {UNMASKED}, not of copies and views of one camera, and of two radar images "
+        "only if it is so much brighter",
         "suites real, margins and attacks",
         WITHOUT,
         _nothing_else,
