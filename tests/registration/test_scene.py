@@ -66,6 +66,14 @@ def test_open_ground_is_looked_for_where_the_radar_image_shows_it(tmp_path: Path
         assert SceneInfo.of(pair, NEITHER).kinds_by(model).open_ground is None
 
 
+def test_a_radar_image_whose_speckle_was_averaged_may_have_canopies() -> None:
+    """By resampling to degrees, say; two camera images of little noise have none."""
+    averaged, camera, model = facts(0.03), facts(0.0005), shift_on_map(0.0, 0.0)
+    assert scene(averaged, camera).sensors is Sensors.CAMERAS
+    assert scene(averaged, camera).kinds_by(model).open_ground is not None
+    assert scene(camera, camera).kinds_by(model).open_ground is None
+
+
 def test_whoever_names_the_radar_image_is_believed(tmp_path: Path) -> None:
     with opened(tmp_path, TOWN, FIELDS) as pair:
         for declared, is_town in ((REFERENCE, True), (INPUT, False)):

@@ -230,10 +230,11 @@ class SceneInfo:
     def _open_ground_by(self, model: Model) -> MaskOf | None:
         """Return a mask of what is not open ground in a radar image; None: there is none.
 
-        It is that of the reference, or that of the input as a model on the map places it; pieces
-        are moved there, but not rotated. It is found when first asked for.
+        Resampling reduces speckle, so what may be a radar image counts as one. The mask is that of
+        the reference, or that of the input as a model on the map places it; pieces are moved there,
+        but not rotated. It is found when first asked for.
         """
-        if self.sensors is Sensors.CAMERAS:
+        if self.sensors is Sensors.CAMERAS and not self.may_be_different:
             return None
 
         def of_reference(piece: Grid) -> Mask:
