@@ -288,15 +288,6 @@ def test_soft_edges_of_clouds_are_no_reason_to_accept(
     assert refusing(found) == ["nothing else in common"] * is_refused
 
 
-@pytest.mark.parametrize(("brighter", "is_refused"), [(0.81, True), (0.79, False)])
-def test_two_radar_images_have_more_in_common_than_bright_clouds(
-    brighter: float, is_refused: bool
-) -> None:
-    rest = in_common(Sensors.RADARS, survey(height=0.9, rival=0.2), brighter=brighter)
-    found = evidence(GOOD, survey=survey(), rest=rest)
-    assert refusing(found) == ["nothing else in common"] * is_refused
-
-
 @pytest.mark.parametrize(
     ("chips", "height", "is_refused"),
     [(49, 1.9, True), (49, 2.1, False), (190, 1.9, True), (200, 1.9, False)],

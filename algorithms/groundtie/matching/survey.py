@@ -57,6 +57,8 @@ class Survey:
     far
         Unsupporting chips and where they match best together, beyond the surfaces' radius, evident
         or not; None: they are too few.
+    elevated
+        See `find_parts`.
     """
 
     grid: Grid
@@ -65,6 +67,7 @@ class Survey:
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
     far: Part | None = None
+    elevated: frozenset[int] = frozenset()
 
     @cached_property
     def mean(self) -> Surface:
@@ -153,7 +156,8 @@ class Survey:
     def parts(self) -> Sequence[Part]:
         """Groups of chips that together match elsewhere, a far one first, then the most evident."""
         far = [] if self.far is None or self.far.excess < LEAST_EXCESS else [self.far]
-        return [*far, *find_parts(self.grid, self.centres, self.surfaces)]
+        near = find_parts(self.grid, self.centres, self.surfaces, elevated=self.elevated)
+        return [*far, *near]
 
 
 def survey_places(grid: Grid) -> Places:

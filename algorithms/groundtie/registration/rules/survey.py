@@ -223,14 +223,12 @@ def height_of_else(rest: Rest | None) -> float:
     """Return the mean similarity of chips without the content that both images share.
 
     Of the surveys without shared windows and without shared edges, the higher; of what may be
-    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made, or if both
-    images are a radar's, unless it may be clouds.
+    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made or both
+    images are a radar's.
     """
-    if rest is None or rest.shared.is_evident:
+    if rest is None or rest.shared.is_evident or rest.shared.sensors is Sensors.RADARS:
         return math.inf
     is_soft = rest.shared.sameness.may_be_clouds
-    if rest.shared.sensors is Sensors.RADARS and not is_soft:
-        return math.inf
     ways = (rest.survey,) if is_soft else (rest.survey, rest.without_edges)
     heights = [left.height for left in ways if left is not None]
     return max(heights, default=math.inf)
@@ -375,8 +373,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
         "vary alike and without the surroundings of edges that coincide; if what varies alike is "
         f"brighter by {LEAST_BRIGHTER:g} standard deviations, as clouds are, without these windows "
-        f"alone. Asked {UNMASKED}, not of copies and views of one camera, and of two radar images "
-        "only if it is so much brighter",
+        f"alone. Asked {UNMASKED}, and not of two radar images, or of copies and views of one "
+        "camera",
         "suites real, margins and attacks",
         WITHOUT,
         _nothing_else,
