@@ -30,6 +30,7 @@ from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
 from groundtie.series.frame import PARAMETERS, SeriesFrame
 from groundtie.similarity.in_common import (
+    FINE_COHERENCE,
     LEAST_AREA,
     LEAST_SHARPNESS,
     MOST_BESIDE,
@@ -46,7 +47,7 @@ from .attacks.examples import is_example
 from .attacks.pairs import Pair, to_bytes
 from .attacks.scenes import Scene
 from .attacks.suite import sample
-from .cases import SAR_OPTICAL
+from .cases import SAR_OPTICAL, SAR_SAR
 from .series_scenes import simulate_series
 from .suites import Goal, Settings, SuiteResult, Table, by_group, run_cases
 
@@ -248,6 +249,9 @@ def run(settings: Settings) -> SuiteResult:
     others = [one for one in apart if one.group not in (BANDS_APART, DATES)]
     least = min((one.sameness.step_width for one in others), default=np.inf)
     most_coarse = max((one.sameness.coarse_area for one in despeckled), default=0.0)
+    radars = [one.sameness for one in placed if one.group in (SAR_OPTICAL, SAR_SAR)]
+    finer = [one.fine_coherence for one in radars if one.fine_coherence > one.coarse_coherence]
+    most_fine = max(finer, default=0.0)
     return SuiteResult(
         "How sharply edges coincide",
         (
@@ -281,6 +285,12 @@ def run(settings: Settings) -> SuiteResult:
                 f"at most {most_coarse:.0%}",
                 most_coarse < LEAST_AREA,
             ),
+            Goal(
+                "Coherence of a radar image's fine structure where it exceeds that of coarse",
+                f"below {FINE_COHERENCE:g}",
+                f"at most {most_fine:.2f}",
+                most_fine < FINE_COHERENCE,
+            ),
         ),
         (
             _table("Ground at its place", [*ground, *despeckled]),
@@ -288,6 +298,7 @@ def run(settings: Settings) -> SuiteResult:
             _table("Drawn over other ground", found),
             _steps_table("Steps between columns or rows, ground at its place", ground),
             _steps_table("Steps between columns or rows, drawn over other ground", found),
+            _coherence_table("Coherence, ground at its place", placed),
         ),
         [one.record() for one in every],
     )
@@ -326,6 +337,16 @@ def _steps_table(title: str, some: list[Measured]) -> Table:
         numbers = f"{min(widths):.2f}", f"{np.median(widths):.2f}"
         rows.append([group, str(len(own)), *numbers, str(sum(one.has_seams for one in own))])
     return Table(title, ("", "pairs", "least width", "median", "at the limit or below"), rows)
+
+
+def _coherence_table(title: str, some: list[Measured]) -> Table:
+    rows = []
+    for group, own in _by_group(some):
+        values = [[one.coarse_coherence, one.fine_coherence] for one in own]
+        (coarse, fine), (most_coarse, most_fine) = np.min(values, axis=0), np.max(values, axis=0)
+        ranges = f"{coarse:.2f} to {most_coarse:.2f}", f"{fine:.2f} to {most_fine:.2f}"
+        rows.append([group, str(len(own)), *ranges])
+    return Table(title, ("", "pairs", "coarse structure", "fine structure"), rows)
 
 
 def _table(title: str, some: list[Measured]) -> Table:

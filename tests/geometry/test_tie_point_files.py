@@ -248,6 +248,16 @@ def test_the_role_of_a_point(tmp_path: Path, word: str, is_check: bool, states_f
     assert (found.is_check.tolist(), found.states_fit) == ([is_check], states_fit)
 
 
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [("Used", "used"), (" used ", "used"), ("", "used"), ("Far off", "Far off")],
+)
+def test_the_state_of_a_point(tmp_path: Path, word: str, expected: str) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text(f"{TABLE},state\n1,2,3,4,{word}\n")
+    assert read_tie_points(path, PLAIN).state.tolist() == [expected]
+
+
 @pytest.mark.parametrize("number", ["1_000", "٣", "１２"])
 @pytest.mark.parametrize("column", [0, 2, 4])
 def test_numbers_as_only_python_writes_them_are_refused(

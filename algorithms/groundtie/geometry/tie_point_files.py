@@ -231,8 +231,7 @@ def _from_rows(
     rows: list[Row], input_grid: Grid, crs: CRS | None, more: Sequence[str]
 ) -> TiePoints:
     """Return the points of a table."""
-    # A drawn line has empty columns.
-    states = [str(row.get("state") or USED) for row in rows]
+    states = [_state(row) for row in rows]
     roles = [_role(row) for row in rows]
     sigma = columns(rows, *SIGMA)
     points = TiePoints.unmeasured(
@@ -250,6 +249,13 @@ def _from_rows(
         more={name: numbers(rows, name) for name in more},
         states_fit="fit" in roles,
     )
+
+
+def _state(row: Row) -> str:
+    """Return the state of a point; what is not used is the reason why."""
+    # A drawn line has empty columns.
+    stated = str(row.get("state") or USED).strip()
+    return USED if stated.lower() == USED else stated
 
 
 def _role(row: Row) -> str:
