@@ -47,16 +47,17 @@ def test_opposite_contrast_is_negative_coherence() -> None:
     assert coherence([products]) == pytest.approx([-1, -1])
 
 
-def test_what_is_not_valid_in_both_has_no_part() -> None:
+@pytest.mark.parametrize(("side", "expected"), [(10, 1.0), (30, 0.0)])
+def test_few_pixels_may_be_invalid_and_have_no_part(side: int, expected: float) -> None:
+    """The outline of a mask, which both images have, would be coherent itself."""
     values = texture(SIDE, SIDE)
     spoilt = values.copy()
-    hidden = np.s_[20:50, 30:60]
+    hidden = np.s_[20 : 20 + side, 30 : 30 + side]
     spoilt[hidden] = 1e6
     valid = np.ones(values.shape, bool)
     valid[hidden] = False
-    assert coherence([spectral_products(patch(values), patch(spoilt, valid))]) == pytest.approx(
-        [1, 1], abs=1e-4
-    )
+    products = spectral_products(patch(values), patch(spoilt, valid))
+    assert coherence([products]) == pytest.approx([expected] * 2, abs=1e-4)
 
 
 def test_constant_windows_have_no_coherence() -> None:

@@ -20,18 +20,23 @@ from .phases import spectra
 # Interpolation leaves little of shorter ones.
 _COARSE_PX, _FINE_PX = 20.0, (4.0, 10.0)
 
+# Windows of which less is valid show the outline of what is not, in both patches.
+_LEAST_VALID = 0.98
+
 
 def spectral_products(reference: Patch, input: Patch) -> NDArray[np.float64]:
     """Return the power of both patches and their real cross power, of windows of equal energy.
 
     Returns
     -------
-    Coarse structure first, then fine; shape (2, 3). 0 if a patch is constant.
+    Coarse structure first, then fine; shape (2, 3). 0 if a patch is constant, or has a mask.
     """
     side = min(reference.values.shape)
-    both = reference.valid & input.valid
+    both = (reference.valid & input.valid)[:side, :side]
+    if both.mean() < _LEAST_VALID:
+        return np.zeros((2, 3))
     windows = [
-        spectra(Patch(patch.values[:side, :side][None], both[:side, :side][None]))[0]
+        spectra(Patch(patch.values[:side, :side][None], both[None]))[0]
         for patch in (reference, input)
     ]
     energies = [float(np.square(np.abs(one)).sum()) for one in windows]
