@@ -148,7 +148,7 @@ def _moved_ground(evidence: RegistrationEvidence) -> float:
 def _fine_coherence(evidence: RegistrationEvidence) -> float:
     """Return the coherence of fine structure if it exceeds that of coarse structure, else 0."""
     rest = evidence.surveys.rest
-    if rest is None or rest.shared.sensors is Sensors.CAMERAS:
+    if rest is None or rest.shared.sensors is not Sensors.RADARS:
         return math.nan
     same = rest.shared.sameness
     return same.fine_coherence if same.fine_coherence > same.coarse_coherence else 0.0

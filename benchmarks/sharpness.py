@@ -249,7 +249,7 @@ def run(settings: Settings) -> SuiteResult:
     others = [one for one in apart if one.group not in (BANDS_APART, DATES)]
     least = min((one.sameness.step_width for one in others), default=np.inf)
     most_coarse = max((one.sameness.coarse_area for one in despeckled), default=0.0)
-    radars = [one.sameness for one in placed if one.group in (SAR_OPTICAL, SAR_SAR)]
+    radars = [one.sameness for one in placed if one.group == SAR_SAR]
     finer = [one.fine_coherence for one in radars if one.fine_coherence > one.coarse_coherence]
     most_fine = max(finer, default=0.0)
     return SuiteResult(
@@ -286,7 +286,7 @@ def run(settings: Settings) -> SuiteResult:
                 most_coarse < LEAST_AREA,
             ),
             Goal(
-                "Coherence of a radar image's fine structure where it exceeds that of coarse",
+                "Coherence of fine structure of two radar images where it exceeds that of coarse",
                 f"below {FINE_COHERENCE:g}",
                 f"at most {most_fine:.2f}",
                 most_fine < FINE_COHERENCE,

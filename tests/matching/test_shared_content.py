@@ -154,9 +154,9 @@ def test_cameras_images_are_alike_in_coarse_pixels(
 def test_a_pattern_of_noise_is_drawn_over_radar_images(
     coarse: float, fine: float, is_noise: bool
 ) -> None:
-    """Fine structure of camera images may be the more coherent: light and seasons are coarse."""
+    """Fine structure of other images may be the more coherent: light and physics are coarse."""
     sameness = replace(ONE_GROUND, area=0.1, coarse_coherence=coarse, fine_coherence=fine)
-    for sensors in (Sensors.RADARS, Sensors.DIFFERENT):
-        shared = SharedContent(sameness, sensors, off_drawn=2.0)
-        assert [shared.is_noise, shared.is_drawn, shared.is_evident] == [is_noise] * 3
-    assert not SharedContent(sameness, Sensors.CAMERAS).is_noise
+    shared = SharedContent(sameness, Sensors.RADARS, off_drawn=2.0)
+    assert [shared.is_noise, shared.is_drawn, shared.is_evident] == [is_noise] * 3
+    for sensors in (Sensors.CAMERAS, Sensors.DIFFERENT):
+        assert not SharedContent(sameness, sensors).is_noise

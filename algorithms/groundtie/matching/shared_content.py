@@ -88,8 +88,11 @@ class SharedContent:
 
     @property
     def is_noise(self) -> bool:
-        """Whether the images share a pattern of noise; coarse structure of camera images varies."""
-        return self.sensors is not Sensors.CAMERAS and self.sameness.is_noise
+        """Whether two radar images share a pattern of noise.
+
+        Other sensors, light and seasons change coarse structure.
+        """
+        return self.sensors is Sensors.RADARS and self.sameness.is_noise
 
     @property
     def is_of_cameras(self) -> bool:

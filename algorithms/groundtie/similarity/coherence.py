@@ -1,9 +1,8 @@
 """Coherence of two superimposed arrays in coarse and in fine structure.
 
 Source: [Carter1973]. Ground varies more in coarse structure than in fine; speckle and a sensor's
-noise do so as much in both. Images of one ground, one of them a radar's, are therefore no less
-coherent in coarse structure than in fine. If they share a pattern of noise over other ground, they
-are.
+noise do so as much in both. Two radar images of one ground are therefore no less coherent in coarse
+structure than in fine. If they share a pattern of noise over other ground, they are.
 """
 
 from __future__ import annotations

@@ -87,10 +87,10 @@ LEAST_BRIGHTER = 0.8
 # Least valid share of the pixels that a pixel of a reduced image averages.
 _LEAST_VALID = 0.25
 
-# Fine structure of images that share a pattern of noise, one of them a radar's, is at least this
-# coherent, and more so than coarse structure. In images of one ground where it is, it reaches 0.12,
-# of two radars 0.07 (suite sharpness, 440 pairs). Noise that is smooth along up to 1.3 px is above
-# the limit over other ground (tests/similarity/test_coherence.py); what is smoother passes.
+# Fine structure of two radar images that share a pattern of noise is at least this coherent, and
+# more so than coarse structure. In 4 of 100 pairs of one ground it is the more coherent one, by up
+# to 0.07 (suite sharpness). Noise that is smooth along up to 1.3 px is above the limit over other
+# ground (tests/similarity/test_coherence.py); what is smoother passes.
 FINE_COHERENCE = 0.15
 
 # Copies share this much, in the images and in reduced ones, so that too little is left to judge.
@@ -195,7 +195,7 @@ class Sameness:
 
     @property
     def is_noise(self) -> bool:
-        """Whether images, one of them a radar's, share a pattern of noise, finer than ground."""
+        """Whether two radar images share a pattern of noise, which is finer than ground."""
         return self.fine_coherence >= max(FINE_COHERENCE, self.coarse_coherence)
 
     @property

@@ -166,7 +166,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest is None or not rest.shared.is_evident:
         return None
     if rest.shared.is_noise:
-        return "both images have the same pattern of noise, finer than ground"
+        return "both radar images have the same pattern of noise, finer than ground"
     if rest.shared.is_drawn:
         return "both images have the same drawn edges, sharper than the ground's or side by side"
     left = rest.survey
@@ -316,8 +316,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         "pixel-locked content",
         "both images have the same content, pixel by pixel, such as labels or clouds. Its edges "
         "are sharper than edges of the ground, or lie beside one another. Or it is a pattern of "
-        "noise in a radar image and another one, whose fine structure is more coherent than their "
-        "coarse structure. Or, without it, less than a quarter of the chips is left, their mean "
+        "noise in two radar images, whose fine structure is more coherent than their coarse "
+        "structure. Or, without it, less than a quarter of the chips is left, their mean "
         f"similarity is below {WEAK_HEIGHT:g} robust standard deviations, or a second place "
         f"matches about as well or is a peak of {REST_PEAK_DEVIATIONS:g}. Copies and views of one "
         "camera are refused only if edges are sharp, and a quarter of the chips is left that is as "
