@@ -345,8 +345,11 @@ def _coherence_table(title: str, some: list[Measured]) -> Table:
         values = [[one.coarse_coherence, one.fine_coherence] for one in own]
         (coarse, fine), (most_coarse, most_fine) = np.min(values, axis=0), np.max(values, axis=0)
         ranges = f"{coarse:.2f} to {most_coarse:.2f}", f"{fine:.2f} to {most_fine:.2f}"
-        rows.append([group, str(len(own)), *ranges])
-    return Table(title, ("", "pairs", "coarse structure", "fine structure"), rows)
+        finer = [fine for coarse, fine in values if fine > coarse]
+        found = f"{len(finer)}, of up to {max(finer):.2f}" if finer else "none"
+        rows.append([group, str(len(own)), *ranges, found])
+    columns = ("", "pairs", "coarse structure", "fine structure", "fine structure the higher")
+    return Table(title, columns, rows)
 
 
 def _table(title: str, some: list[Measured]) -> Table:

@@ -133,20 +133,6 @@ def test_few_chips_that_are_highest_farther_off_are_no_part(
     assert len(list(find_parts(GRID, CENTRES, surfaces))) == found
 
 
-@pytest.mark.parametrize(("right", "on_ground", "found"), [(22, 5, 0), (22, 6, 1), (18, 0, 1)])
-def test_of_what_lies_as_far_as_canopies_do_the_ground_alone_counts(
-    right: int, on_ground: int, found: int
-) -> None:
-    """An eighth of 42 chips is 5.25: 12 of them lie elsewhere, some of which are no forest."""
-    surfaces = noise()
-    elsewhere = (CENTRES < (100, 300)).all(axis=1)
-    raised(surfaces, elsewhere, (right, 0), 8.0)
-    forest = frozenset(np.flatnonzero(elsewhere)[on_ground:].tolist())
-    parts = list(find_parts(GRID, CENTRES, surfaces, elevated=forest))
-    assert len(parts) == found
-    assert all(part.is_far == (right > 20) for part in parts)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_no_other_set_of_neighbours_is_higher(seed: int) -> None:
     """Tried exhaustively: all five sets of at least three of four chips."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,19 +67,13 @@ class FarSearch:
         survey, chip_px
             The survey, and the side of its chips.
         open_ground
-            Returns which pixels of a radar image are not open ground; such chips count neither
-            there nor in parts beyond `CANOPIES_PX`, as canopies and roofs may be displaced as far.
-            None: there is no radar image.
+            Returns which pixels of a radar image are not open ground; such chips are left out, as
+            canopies and roofs may be displaced as far. None: there is no radar image.
         """
         unsupporting = survey.is_unsupporting_chip
         fewest = max(CANOPIES_SHARE * len(unsupporting), 1)
-        if open_ground is not None:
-            asked = {chip for part in survey.parts if part.is_far for chip in part.members}
-            if unsupporting.sum() >= fewest:
-                asked.update(np.flatnonzero(unsupporting).tolist())
-            elevated = self._elevated(survey, sorted(asked), chip_px, open_ground)
-            survey = replace(survey, elevated=elevated)
-            unsupporting[sorted(elevated)] = False
+        if open_ground is not None and unsupporting.sum() >= fewest:
+            unsupporting = unsupporting & self._is_open(survey, unsupporting, chip_px, open_ground)
         if unsupporting.sum() < fewest:
             return survey
         try:
@@ -92,17 +85,19 @@ class FarSearch:
         part = Part.of(survey.grid, survey.centres, members, place.shift_px, excess)
         return replace(survey, far=part)
 
-    def _elevated(
-        self, survey: Survey, chips: Sequence[int], chip_px: int, open_ground: MaskOf
-    ) -> frozenset[int]:
-        """Return which of some chips, by number, are not open ground by half or more."""
+    def _is_open(
+        self, survey: Survey, asked: NDArray[np.bool_], chip_px: int, open_ground: MaskOf
+    ) -> NDArray[np.bool_]:
+        """Return which of the chips that are asked for are open ground by more than half, (n,)."""
 
-        def is_elevated(chip: int) -> bool:
-            col, row = (int(at) - chip_px // 2 for at in survey.centres[chip])
-            return bool(open_ground(survey.grid.window(col, row, chip_px, chip_px)).mean() >= 0.5)
+        def of(number: int) -> bool:
+            col, row = (int(at) - chip_px // 2 for at in survey.centres[number])
+            return bool(open_ground(survey.grid.window(col, row, chip_px, chip_px)).mean() < 0.5)
 
-        found = self.context.map(is_elevated, chips)
-        return frozenset(chip for chip, is_so in zip(chips, found, strict=True) if is_so)
+        numbers = np.flatnonzero(asked)
+        found = np.zeros(len(asked), bool)
+        found[numbers] = list(self.context.map(of, [int(one) for one in numbers]))
+        return found
 
     def _best(
         self, settings: SimilaritySettings, beyond_px: float, hidden: MaskOf | None = None

@@ -154,18 +154,9 @@ class Part:
         """Length of their shift."""
         return float(np.hypot(*self.shift_px))
 
-    @property
-    def is_far(self) -> bool:
-        """Whether it may be canopies or roofs of a radar image."""
-        return self.distance_px > CANOPIES_PX
-
 
 def find_parts(
-    grid: Grid,
-    centres: NDArray[np.int_],
-    surfaces: Surfaces,
-    least: float = LEAST_EXCESS,
-    elevated: frozenset[int] = frozenset(),
+    grid: Grid, centres: NDArray[np.int_], surfaces: Surfaces, least: float = LEAST_EXCESS
 ) -> Iterator[Part]:
     """Yield parts, the most evident first; no chip belongs to two of them.
 
@@ -180,9 +171,6 @@ def find_parts(
         (n, 2 r + 1, 2 r + 1).
     least
         The smallest excess of a part.
-    elevated
-        Numbers of chips of a radar image that are not open ground. They do not count in parts
-        beyond `CANOPIES_PX`, as canopies and roofs may be displaced as far.
     """
     shifts, higher = _higher_elsewhere(surfaces)
     are_neighbours = _are_neighbours(centres)
@@ -190,10 +178,8 @@ def find_parts(
     while found := _highest_group(higher, are_neighbours, left, least):
         members, place, excess = found
         x, y = map(float, shifts[place])
-        part = Part.of(grid, centres, members, (x, y), excess)
-        on_ground = len(set(part.members) - elevated)
-        if not part.is_far or on_ground >= CANOPIES_SHARE * len(centres):
-            yield part
+        if np.hypot(x, y) <= CANOPIES_PX or len(members) >= CANOPIES_SHARE * len(centres):
+            yield Part.of(grid, centres, members, (x, y), excess)
         left = np.setdiff1d(left, members)
 
 

@@ -57,8 +57,6 @@ class Survey:
     far
         Unsupporting chips and where they match best together, beyond the surfaces' radius, evident
         or not; None: they are too few.
-    elevated
-        See `find_parts`.
     """
 
     grid: Grid
@@ -67,7 +65,6 @@ class Survey:
     surfaces: Surfaces
     elsewhere_px: float = ELSEWHERE_PX
     far: Part | None = None
-    elevated: frozenset[int] = frozenset()
 
     @cached_property
     def mean(self) -> Surface:
@@ -156,8 +153,7 @@ class Survey:
     def parts(self) -> Sequence[Part]:
         """Groups of chips that together match elsewhere, a far one first, then the most evident."""
         far = [] if self.far is None or self.far.excess < LEAST_EXCESS else [self.far]
-        near = find_parts(self.grid, self.centres, self.surfaces, elevated=self.elevated)
-        return [*far, *near]
+        return [*far, *find_parts(self.grid, self.centres, self.surfaces)]
 
 
 def survey_places(grid: Grid) -> Places:

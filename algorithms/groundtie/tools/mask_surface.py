@@ -32,12 +32,7 @@ def mask_surface(
     reference: general.Reference,
     surface_model: Annotated[
         Path,
-        replace(
-            registration.SURFACE_MODEL,
-            help="Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with "
-            "a field height in metres.",
-            advanced=False,
-        ),
+        replace(registration.SURFACE_MODEL, help=registration.SURFACE_HEIGHTS, advanced=False),
     ],
     output: general.MaskOut,
     reasons: Annotated[

@@ -262,8 +262,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"has them: all but the highest together by {LEAST_EXCESS:g} standard deviations of noise. "
         f"Or chips that hardly match where it has them, {CANOPIES_SHARE:.1%} or more, together "
         f"match more than {CANOPIES_PX:g} px and up to a quarter of the longer side off, by "
-        f"{LEAST_EXCESS:g} robust standard deviations better. More than {CANOPIES_PX:g} px off, "
-        "chips of a radar image count on open ground alone",
+        f"{LEAST_EXCESS:g} robust standard deviations better; in a radar image, chips of open "
+        "ground alone",
         "[Neill2012]; suites margins and attacks",
         "register the parts of a mosaic one by one; in a town, give a mask of the ground",
         _part_elsewhere,

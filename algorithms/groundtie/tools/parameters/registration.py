@@ -126,9 +126,12 @@ InputDem = Annotated[
         advanced=True,
     ),
 ]
+SURFACE_HEIGHTS = (
+    "Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field "
+    "height in metres."
+)
 SURFACE_MODEL = MaskIn(
-    help="Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a "
-    "field height in metres. Only ground that both images show takes part: no layover, radar "
+    help=f"{SURFACE_HEIGHTS} Only ground that both images show takes part: no layover, radar "
     "shadow, relief displacement or cast shadow. Needs the views of both images.",
     advanced=True,
 )
