@@ -21,12 +21,11 @@ from groundtie.kinds import plain
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import Survey
-from groundtie.matching.surveys import Rest
+from groundtie.matching.surveys import LEAST_OF_REST, Rest
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
     EVEN_PEAK_DEVIATIONS,
-    LEAST_OF_REST,
     LEAST_POSITIVE,
     MOST_NEGATIVE,
     PEAK_DEVIATIONS,
@@ -38,6 +37,7 @@ from groundtie.registration.rules.survey import (
     deviations_of_unexplained,
     has_few_chips,
     height_of_else,
+    least_of_else,
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
@@ -154,9 +154,17 @@ def _fine_coherence(evidence: RegistrationEvidence) -> float:
     return same.fine_coherence if same.fine_coherence > same.coarse_coherence else 0.0
 
 
-def _height_of_else(evidence: RegistrationEvidence) -> float:
-    height = height_of_else(evidence.surveys.rest)
-    return height if math.isfinite(height) else math.nan
+def _height_of_else(are_views: bool) -> Callable[[RegistrationEvidence], float]:
+    """Return the statistic, over its limit, of moved views of one camera or of other images."""
+
+    def height_of(evidence: RegistrationEvidence) -> float:
+        rest = evidence.surveys.rest
+        if rest is None or rest.shared.is_moved_view != are_views:
+            return math.nan
+        height = height_of_else(rest) / max(least_of_else(evidence.surveys), 0.1)
+        return height if math.isfinite(height) else math.nan
+
+    return height_of
 
 
 def _brighter(evidence: RegistrationEvidence) -> float:
@@ -206,7 +214,8 @@ STATISTICS = (
     Statistic("pixel-locked content: fine coherence", FINE_COHERENCE, _fine_coherence),
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
-    Statistic("nothing else in common: height", LEAST_OF_REST, _height_of_else, False),
+    Statistic("nothing else in common: height", 1.0, _height_of_else(False), False),
+    Statistic("nothing else in common: height, views", 1.0, _height_of_else(True), False),
     Statistic("nothing else in common: brighter", LEAST_BRIGHTER, _brighter),
     Statistic(
         "rest elsewhere: second peak",

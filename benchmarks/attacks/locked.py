@@ -23,6 +23,9 @@ _ROTATIONS_DEG, _SCALES = (6.0, 40.0), (1.12, 1.35)
 # How often blurred content has the opposite contrast in the input.
 _OPPOSITE = 0.3
 
+# How far off a screenshot is placed by hand.
+_OFF_BY_HAND_PX = 2.0, 10.0
+
 
 def _moved(pair: Pair, setting: Setting) -> Pair:
     shift = direction(setting.rng, _NEAREST_PX, _FARTHEST_PX)
@@ -185,6 +188,23 @@ def on_another_grid(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
     return lambda draw: resampled(way(draw))
 
 
+def placed_by_hand(way: Callable[[Draw], Make]) -> Callable[[Draw], Make]:
+    """The same attack with a resampled input whose georeferencing is some pixels off."""
+
+    def other_way(draw: Draw) -> Make:
+        make = resampled(way(draw))
+
+        def made(pair: Pair, setting: Setting) -> Pair:
+            other, off = make(pair, setting), direction(setting.rng, *_OFF_BY_HAND_PX)
+            place = compose(other.input_transform, Affine.translation(*off))
+            note = f"{other.note}, placed {np.hypot(*off):.1f} px off"
+            return replace(other, input_transform=place, note=note)
+
+        return made
+
+    return other_way
+
+
 _WAYS = {
     "displaced": displaced,
     "other place": other_place,
@@ -203,6 +223,7 @@ _WAYS = {
     "softer": softer(_moved),
     "softer, other place": softer(_elsewhere),
     "softer, resampled": on_another_grid(softer(_moved)),
+    "softer, placed by hand": placed_by_hand(softer(_elsewhere)),
 }
 
 # Variants that need an overlay: effects are functions of the whole array.
@@ -217,6 +238,7 @@ _OVERLAYS_ONLY = (
     "softer",
     "softer, other place",
     "softer, resampled",
+    "softer, placed by hand",
 )
 
 # Modules that register further overlays.

@@ -37,8 +37,9 @@ from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.contrast_signs import ContrastSigns
 from groundtie.matching.parts import LEAST_EXCESS, Part
-from groundtie.matching.shared_content import Sensors
+from groundtie.matching.shared_content import Sensors, SharedContent
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
+from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import Evidence, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.scene import SceneInfo
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
@@ -284,6 +285,39 @@ def test_soft_edges_of_clouds_are_no_reason_to_accept(
 ) -> None:
     """Without its few coinciding edges a cloud is all there; without its windows it is not."""
     rest = left_of_two_sensors(height, 4.0, brighter=brighter)
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["nothing else in common"] * is_refused
+
+
+@pytest.mark.parametrize(
+    ("brighter", "height", "is_refused"),
+    [(0.81, 0.49, True), (0.79, 0.49, False), (0.81, 0.51, False)],
+)
+def test_what_is_brighter_in_two_radar_images_is_not_all_that_matches(
+    brighter: float, height: float, is_refused: bool
+) -> None:
+    """Speckle and what is drawn leave hardly anything; bright ground leaves more."""
+    left = survey(height=height, rival=0.1)
+    rest = in_common(Sensors.RADARS, left, brighter=brighter)
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["nothing else in common"] * is_refused
+
+
+@pytest.mark.parametrize(
+    ("heights", "chips", "is_refused"),
+    [
+        ((1.7, 1.7), 49, True),
+        ((1.8,), 49, False),
+        ((1.7, 1.8), 49, False),
+        ((1.7, 1.7), 200, False),
+    ],
+)
+def test_views_that_move_as_ground_leave_more_than_drawn_lines(
+    heights: tuple[float, ...], chips: int, is_refused: bool
+) -> None:
+    """Unless copies leave too few chips."""
+    shared = SharedContent(VIEWS, Sensors.CAMERAS, off_drawn=2.0)
+    rest = Rest(shared, chips, *(survey(height=height) for height in heights))
     found = evidence(GOOD, survey=survey(), rest=rest)
     assert refusing(found) == ["nothing else in common"] * is_refused
 

@@ -23,10 +23,19 @@ from .shared_content import ImageKinds, Sensors, SharedContent
 from .stripes import survey_stripes
 from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 
-# In images that are not of two radars or one camera, windows that vary alike and edges that
-# coincide are a small part of what matches. Without one or the other, correct transforms leave 1.1
-# and more (suite real), drawn content over different ground mostly up to 0.8.
+# Windows that vary alike and edges that coincide are a small part of what matches on one ground.
+# Without one or the other, correct transforms leave 1.1 and more (suite real), drawn content over
+# different ground mostly up to 0.8.
 LEAST_OF_REST = 1.0
+
+# Views of one camera are alike nearly everywhere. If a transform moves them as ground, they leave
+# 1.8 and more, or 0.36 of what matches as a whole; drawn content that a resampled map moves leaves
+# up to 1.5, and 0.2 (suite margins, LATER).
+LEAST_OF_VIEW, VIEW_SHARE = 1.75, 0.3
+
+# What two radar images share may be most of what speckle leaves. Where it is as bright as what is
+# drawn, different grounds leave 0.01, correct transforms 0.97 and more (suite margins, LATER).
+LEAST_OF_RADARS = 0.5
 
 
 @dataclass(frozen=True)
@@ -43,14 +52,22 @@ class Rest:
         The survey; None: not made, as there is hardly any such content, or its edges show that it
         is drawn, or the images are copies or views that hide nothing.
     without_edges
-        The survey without the surroundings of coinciding edges. It is made where no identical
-        content is evident and hardly anything is left, unless both are radar images; else None.
+        The survey without the surroundings of coinciding edges. It is made where content may be
+        drawn without being evident, unless both are radar images: if less than `least` is left, or
+        two camera images have hardly any identical content. Else None.
     """
 
     shared: SharedContent
     chips: int
     survey: Survey | None = None
     without_edges: Survey | None = None
+
+    @property
+    def least(self) -> float:
+        """The height that one of both surveys should reach."""
+        if self.shared.sensors is Sensors.RADARS:
+            return LEAST_OF_RADARS
+        return LEAST_OF_VIEW if self.shared.is_moved_view else LEAST_OF_REST
 
 
 @dataclass(frozen=True)
@@ -144,7 +161,7 @@ def survey_all(
         stripes = survey_stripes(pair, places.grid, transform, elsewhere_px, context.quiet())
         part = context.part(0.4, 0.9)
         both = images, on_level
-        rest = survey_rest(matcher, transform, places, accuracy_px, sensors, both, part)
+        rest = survey_rest(matcher, transform, places, accuracy_px, kinds, both, part)
         if rest is not None:  # else there is no map layer that the ground could lie beneath
             unexplained = survey_unexplained(images, elsewhere_px, context.quiet())
     last = context.part(0.9, 1.0)
@@ -193,7 +210,7 @@ def survey_rest(
     transform: Transform,
     places: Places,
     accuracy_px: tuple[float, float],
-    sensors: Sensors,
+    kinds: ImageKinds,
     images: tuple[Resampled, Resampled],
     context: Context,
 ) -> Rest | None:
@@ -206,18 +223,19 @@ def survey_rest(
     -------
     The result; None where no such content is looked for. It has no survey where there is hardly
     any identical content, unless both are radar images, in which speckle blurs it; nor where the
-    content is drawn; nor where the images are copies or views that hide nothing.
+    content is drawn; nor where the images are copies or unmoved views that hide nothing.
     """
+    if kinds.sensors is None:
+        return None
     whole, on_level = images
     elsewhere_px, exact_px = accuracy_px
     asked, quiet = survey_places(matcher.pair.grid), context.quiet()
-    locked = find_locked_content(whole, transform, asked, sensors, exact_px, quiet)
+    locked = find_locked_content(whole, transform, asked, kinds.sensors, exact_px, quiet)
     if locked is None:
         return None
-    shared, chips = locked.shared, len(places.centres)
-    are_radars = sensors is Sensors.RADARS
-    if not (shared.is_evident or shared.may_be_drawn or are_radars):
-        return Rest(shared, chips)
+    shared = locked.shared
+    are_radars = kinds.sensors is Sensors.RADARS
+    are_cameras = kinds.sensors is Sensors.CAMERAS and not kinds.may_be_different
     # A mask leaves little content, most of which a single measure would miss.
     fused = replace(matcher, settings=SimilaritySettings())
     # The mask of the reference depends on the input, so descriptions cannot be reused.
@@ -226,12 +244,15 @@ def survey_rest(
     def left_without(mask: MaskOf) -> Survey:
         return survey_model(fused, on_level, places, elsewhere_px, once, mask)
 
-    if not shared.is_evident:
+    rest = Rest(shared, len(places.centres))
+    if shared.is_drawn or (shared.is_moved_view and not are_cameras):
+        return rest
+    if not shared.may_be_drawn:
+        is_asked = shared.is_evident and (not shared.is_explained or shared.may_hide_ground)
+        return replace(rest, survey=left_without(locked)) if is_asked else rest
+    is_low = are_cameras
+    if shared.sameness.covers_some or are_radars:
         left = left_without(locked)
-        is_low = left.height < LEAST_OF_REST and not are_radars
-        without_edges = left_without(locked.around_edges) if is_low else None
-        return Rest(shared, chips, left, without_edges=without_edges)
-    if shared.is_drawn:
-        return Rest(shared, chips)
-    is_asked = not shared.is_explained or shared.may_hide_ground
-    return Rest(shared, chips, left_without(locked) if is_asked else None)
+        rest = replace(rest, survey=left)
+        is_low = left.height < rest.least and not are_radars
+    return replace(rest, without_edges=left_without(locked.around_edges)) if is_low else rest
