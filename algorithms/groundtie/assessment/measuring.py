@@ -60,8 +60,8 @@ class AssessmentFiles:
         by_eye = has_report and None not in images.values()
         if not (by_points or by_eye or by_consistency):
             raise ParameterError(
-                "there is nothing to judge by: give check_points, tie_points, back_transform, or "
-                "reference, input and report"
+                "there is nothing to judge by: give check_points, tie_points or back_transform, or "
+                "both images and a report"
             )
         if max_error_px is not None and not by_points:
             raise ParameterError("max_error needs points: give check_points or tie_points")
