@@ -190,13 +190,13 @@ def assess(
         ),
     ] = None,
     model: Annotated[
-        str,
+        str | None,
         Choice(
-            help="What is fitted to tie points where there is no transform.",
+            help="What is fitted to tie points where there is no transform; affine by default.",
             choices=KINDS,
             advanced=True,
         ),
-    ] = "affine",
+    ] = None,
     progress: Progress = SILENT,
     parameters: Values = NO_VALUES,
 ) -> AssessmentResult:
