@@ -1,0 +1,14 @@
+"""Numbers in sentences for users."""
+
+from __future__ import annotations
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words, as `1 point` or `2 points`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """Return a number with its sign; one that is rounded to 0 is positive."""
+    # Adding 0 turns -0.0 into 0.0.
+    return f"{round(value, digits) + 0.0:+.{digits}f}"
