@@ -1,4 +1,4 @@
-"""Numbers in sentences for users."""
+"""Words, and numbers, in sentences for users."""
 
 from __future__ import annotations
 
