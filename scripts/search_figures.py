@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import groundtie
 from groundtie.matching import belief_propagation
+from groundtie.rasters.grid import apply_affine
 from scripts.drawing import (
     BLUE,
     ORANGE,
@@ -127,9 +128,9 @@ def _draw_displacements(axes: Axes, pair: Path, points: Path) -> None:
         nominal = source.transform
     for role, colour, name in (("fit", BLUE, "tie points"), ("check", ORANGE, "check points")):
         chosen = [row for row in rows if row["role"] == role]
-        position = np.array([to_pixel @ xy for xy in columns(chosen, "reference_x", "reference_y")])
+        position = apply_affine(to_pixel, columns(chosen, "reference_x", "reference_y"))
         pixels = columns(chosen, "input_col", "input_row") + 0.5
-        found = np.array([to_pixel @ (nominal @ xy) for xy in pixels])
+        found = apply_affine(to_pixel, apply_affine(nominal, pixels))
         draw_arrows(axes, position, found - position, 5.0, colour)
         axes.plot([], [], color=colour, label=name)
     axes.set(xlim=(0, bounds[0]), ylim=(bounds[1], 0))
@@ -142,12 +143,12 @@ def _true_shift_px(pair: Path, x: float | None, y: float | None) -> tuple[float,
     """Return the shift (right, down) of a place's nominal position in the input."""
     with rasterio.open(pair / "reference.tif") as source:
         pixel_m = source.transform.a
-        middle = source.transform @ (source.width / 2, source.height / 2)
+        middle = apply_affine(source.transform, [source.width / 2, source.height / 2])[0]
     with rasterio.open(pair / "input.tif") as source:
         nominal = source.transform
     xy = middle if x is None or y is None else (x, y)
     truth = groundtie.load_transform(pair / "truth.json")
-    found = nominal @ (truth(np.array([xy]))[0] + 0.5)
+    found = apply_affine(nominal, truth(np.array([xy])) + 0.5)[0]
     return (found[0] - xy[0]) / pixel_m, (xy[1] - found[1]) / pixel_m
 
 

@@ -177,6 +177,7 @@ def registration_of(
     """Return what a report reads of a registration."""
     found = SimpleNamespace(
         pair=pair,
+        notes=pair.notes,
         tie_points=points,
         transform=transform,
         correction=None if transform is None else Correction.of(transform, pair.grid),

@@ -25,6 +25,7 @@ from own_processes import ENVIRONMENT, interrupted, read_until
 from toys import TOY, run_tools
 
 from groundtie.cli import main
+from groundtie.errors import ParameterError
 from groundtie.tools import NAMES, load_tool, named_tool
 from groundtie.version import __version__
 
@@ -112,6 +113,29 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert out == ""
     assert re.fullmatch(f"groundtie: error: {message}\n", err)
     assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("raised", "shown"),
+    [
+        ("give tie_points or a reference", "give --tie-points or a reference"),
+        (
+            "a start (transform) needs search_radius.",
+            "a start (--transform) needs --search-radius.",
+        ),
+        ("size, not 'search_radius'", "size, not 'search_radius'"),
+        ("no file a/tie_points.gpkg", "no file a/tie_points.gpkg"),
+        ("no file tie_points/a.gpkg", "no file tie_points/a.gpkg"),
+    ],
+)
+def test_errors_of_a_tool_spell_parameters_as_options(
+    raised: str, shown: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(**values: Any) -> Any:
+        raise ParameterError(raised)
+
+    assert run_tools(GOOD.split(), [dataclasses.replace(TOY, run=fail)]) == 2
+    assert capsys.readouterr().err == f"groundtie: error: {shown}\n"
 
 
 def test_a_refusal_is_one_line_and_exit_code_3(capsys: pytest.CaptureFixture[str]) -> None:

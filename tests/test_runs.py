@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,26 @@ def test_another_parameter_or_another_input_has_another_id(call: Path) -> None:
     assert id_of(call, resampling="nearest") != first
     os.utime(call / "a.tif", (1, 1))
     assert id_of(call) != first
+
+
+@pytest.mark.parametrize("named", ["b.vrt", "vrt://a.tif?bands=1", "/vsizip/z.zip/a.tif"])
+def test_another_state_of_a_file_behind_the_input_has_another_id(
+    call: Path, named: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(call)
+    source = call / ("z.zip" if "zip" in named else "a.tif")
+    if named == "b.vrt":
+        (call / named).write_text(
+            "<VRTDataset><SourceFilename relativeToVRT='1'>a.tif</SourceFilename></VRTDataset>"
+        )
+    elif source.suffix == ".zip":
+        with zipfile.ZipFile(source, "w") as archive:
+            archive.write(call / "a.tif", "a.tif")
+    given: Any = call / named if named == "b.vrt" else named
+    first = id_of(call, input=given)
+    assert id_of(call, input=given) == first
+    os.utime(source, (1, 1))
+    assert id_of(call, input=given) != first
 
 
 def test_another_state_of_a_file_that_states_a_view_has_another_id(call: Path) -> None:

@@ -10,6 +10,7 @@ import errno
 import json
 import logging
 import os
+import re
 import shutil
 import signal
 import sys
@@ -22,13 +23,23 @@ import click
 from click.shell_completion import CompletionItem
 
 from .declaration import Parameter, Tool
-from .errors import CancelledError, GroundTieError, NotRegisteredError, OutputError, one_line
+from .errors import (
+    CancelledError,
+    GroundTieError,
+    NotRegisteredError,
+    OutputError,
+    ParameterError,
+    one_line,
+)
 from .kinds import Choice, Flag, FolderOut, Kind, Number, PathKind, RastersIn
 from .memory import DEFAULT_MB, VARIABLE, budget_bytes, set_heaps
 from .packages import use_one_thread
 from .progress import Progress
 from .tools import NAMES, load_tool, named_tool
 from .version import __version__
+
+# A word of a message, with its parentheses, that is no part of a path or of a quoted text.
+_WORD = re.compile(r"(?<![\w./\\'\"-])(?:\(\w+\)|\w+)(?![\w/\\'\"-]|\.\w)")
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -302,6 +313,8 @@ class ToolCommand(click.Command):
             if as_json and error.verdict is not None:
                 _print_json(error.summary())
             raise
+        except ParameterError as error:
+            raise ParameterError(_respelled(str(error), self.tool)) from error
         if as_json:
             _print_json(result.summary())
         else:
@@ -357,6 +370,18 @@ def spelled(parameter: Parameter) -> str:
     """Return how the command line spells a parameter: `REFERENCE`, `--search-radius`."""
     name = parameter.name.replace("_", "-")
     return name.upper() if parameter.positional else f"--{name}"
+
+
+def _respelled(message: str, tool: Tool) -> str:
+    """Return a tool's message with its parameters spelled as the command line spells them.
+
+    A name of a single word is also a word of the language, unless it stands in parentheses.
+    """
+    names = {p.name: spelled(p) for p in tool.all_parameters}
+    names = {name: text for name, text in names.items() if "_" in name} | {
+        f"({name})": f"({text})" for name, text in names.items()
+    }
+    return _WORD.sub(lambda found: names.get(found[0], found[0]), message)
 
 
 def _metavar(kind: Kind) -> str:

@@ -19,11 +19,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
-from .call_paths import check_different, check_paths
+from .call_paths import check_different, check_paths, inputs_of
 from .errors import MemoryLimitError, ParameterError
-from .kinds import Kind, RasterIn, RastersIn, Views, WrittenKind
+from .kinds import Kind, RasterIn, RastersIn, WrittenKind
 from .memory import bounded_cache
+from .raster_names import local_files
 from .runs import run_of_call, running
+from .vrt_sources import sources_of
 
 
 class ToolResult(Protocol):
@@ -239,8 +241,15 @@ def tool(
 
 
 def _with_files(kind: Kind, value: Any) -> Any:
-    """Return a checked value; of views that files state, these files with it."""
-    files = kind.files_named(value) if isinstance(kind, Views) else ()
+    """Return a checked value and the files that it stands for.
+
+    These are the files that views or GDAL's names refer to, and the sources of virtual rasters.
+    """
+    files: list[Path] = []
+    for given in inputs_of(kind, value):
+        named = local_files(given) if isinstance(given, str) else [given]
+        for path in (one for one in named if isinstance(one, Path)):
+            files += [path, *sources_of(path)]
     return (value, *files) if files else value
 
 

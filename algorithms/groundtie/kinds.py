@@ -153,6 +153,11 @@ class MaskIn(InputKind):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SurfaceIn(MaskIn):
+    """A raster of heights, or a vector layer of buildings with theirs, named as masks are."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class FileIn(InputKind):
     """Any other file that is read."""
 

@@ -404,6 +404,13 @@ def test_files_that_cannot_be_understood(tmp_path: Path, name: str, text: str, r
     assert name in str(raised.value)
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a.points", "a.geojson"])
+def test_another_encoding_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("{}", encoding="utf-16")
+    with pytest.raises(TransformFileError, match="is no UTF-8 text: save it as UTF-8"):
+        read_tie_points(tmp_path / name, GRID)
+
+
 def test_a_missing_file(tmp_path: Path) -> None:
     for suffix in FORMATS:
         with pytest.raises(TransformFileError, match="missing"):

@@ -192,6 +192,12 @@ def test_other_files_are_refused_by_name(tmp_path: Path, text: str) -> None:
         load_transform(path)
 
 
+def test_another_encoding_is_named(tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text("{}", encoding="utf-16")
+    with pytest.raises(TransformFileError, match=r"t\.json: it is no UTF-8 text"):
+        load_transform(tmp_path / "t.json")
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(TransformFileError, match=r"missing\.json"):
         load_transform(tmp_path / "missing.json")

@@ -141,6 +141,15 @@ def test_what_is_no_layer(tmp_path: Path, content: bytes) -> None:
         read_vector_layer(path)
 
 
+def test_another_encoding_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    feature = {"type": "Feature", "properties": {"Größe": 1}, "geometry": None}
+    collection = {"type": "FeatureCollection", "features": [feature]}
+    path.write_text(json.dumps(collection, ensure_ascii=False), encoding="latin-1")
+    with pytest.raises(VectorLayerError, match="its texts are not in UTF-8"):
+        read_vector_layer(path)
+
+
 def test_a_crs_that_is_no_maps(tmp_path: Path) -> None:
     path = tmp_path / "a.geojson"
     collection = {"type": "FeatureCollection", "features": []}

@@ -270,4 +270,7 @@ def test_chips_alone_do_where_there_are_no_keypoints(files: TexturedPair) -> Non
         with pytest.raises(TooFewPointsError):
             keypoints_of(pair, detector=none)
         found = estimate_of(pair, detector=none)
+        with_keypoints = estimate_of(pair)
     assert error_px(found.transform, files) < 0.4
+    assert found.notes == ("too few keypoints match: the model is that of chips alone",)
+    assert with_keypoints.notes == ()

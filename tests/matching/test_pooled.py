@@ -99,6 +99,21 @@ def test_colour_is_matched_where_brightness_shows_nothing(
             assert matcher.colours is None, "whoever asks for a band has it matched"
 
 
+def test_colours_are_those_of_the_part_where_the_images_overlap(tmp_path: Path) -> None:
+    """A file that holds no data in its middle, and the pair in a corner."""
+    with masked(tmp_path, shift_on_map(30.0, -20.0), lines(SIZE)) as (plain, _):
+        pair = with_colour(plain, tmp_path)
+        source = pair.input.source
+        bands = np.zeros((3, SIZE[1], 3000), np.uint16)
+        bands[:, :, : SIZE[0]] = source.read_bands(source.window, [1, 2, 3])[0]
+        wide = source.grid.window(0, 0, 3000, SIZE[1])
+        path = write_raster(tmp_path / "wide.tif", bands, wide, nodata=0)
+        large = replace(pair, input=replace(pair.input, source=open_raster(path)))
+        of_part, of_whole = (PooledHistogramMatcher.of(p, 64, HeldOut.of(p)) for p in (pair, large))
+    assert of_part.colours is not None and of_whole.colours is not None
+    assert np.array_equal(of_part.colours.hue_edges, of_whole.colours.hue_edges)
+
+
 def test_images_of_fewer_bands_are_matched_by_grey_levels(tmp_path: Path) -> None:
     with masked(tmp_path, shift_on_map(30.0, -20.0), lines(SIZE)) as (pair, _):
         assert PooledHistogramMatcher.of(pair, 64, HeldOut.of(pair)).colours is None

@@ -19,6 +19,7 @@ TYPES = {
     "RastersIn": "multilayer",
     "VectorIn": "vector",
     "MaskIn": "layer",
+    "SurfaceIn": "layer",
     "FileIn": "file",
     "RasterOut": "rasterDestination",
     "VectorOut": "vectorDestination",

@@ -26,6 +26,7 @@ from known_reports import (
 from raster_files import write_raster
 from rasterio.crs import CRS
 
+from groundtie.geometry.accuracy import Ellipse
 from groundtie.geometry.fitting import fit_model
 from groundtie.geometry.models import shift_model
 from groundtie.geometry.transform import Transform
@@ -54,6 +55,12 @@ def test_the_verdict_comes_first(page: Page) -> None:
     assert [e.text for e in page.all("sup")] == ["14"]
     assert "less than 0.93 px (9.30 m) with 90 %, by less than 0.45 px with 50 %" in page.text
     assert "18 % of the overlap lies outside" in page.text
+
+
+def test_the_error_ellipse_is_shown_where_it_is_known(pair: ImagePair, tmp_path: Path) -> None:
+    accuracy = replace(ACCEPTED.accuracy, ellipse=Ellipse(1.204, 0.8, 35.4))
+    page = written(refused(pair, verdict=replace(ACCEPTED, accuracy=accuracy)), tmp_path)
+    assert page.numbers["Error ellipse (90 %)"] == "1.20 × 0.80 px longer at 35°"
 
 
 @pytest.mark.parametrize(("ce90_px", "said"), [(0.6, "larger"), (3.0, "smaller")])

@@ -383,6 +383,14 @@ class TestFormatsOfOthers:
         with pytest.raises(TransformFileError, match=message):
             read_control_points(tmp_path / name, *located)
 
+    @pytest.mark.parametrize("name", ["a.pts", "a.csv", "a.json"])
+    def test_another_encoding_is_named(
+        self, tmp_path: Path, located: tuple[Orientation, Grid], name: str
+    ) -> None:
+        (tmp_path / name).write_text("1 2 3 4\n", encoding="utf-16")
+        with pytest.raises(TransformFileError, match="is no UTF-8 text: save it as UTF-8"):
+            read_control_points(tmp_path / name, *located)
+
     def test_a_raster_without_gcps_is_told(
         self, tmp_path: Path, located: tuple[Orientation, Grid]
     ) -> None:

@@ -49,7 +49,8 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Simul
     @cache
     def pair(distortion: str) -> SimulatedFiles:
         folder = tmp_path_factory.mktemp(distortion)
-        simulate(folder, 480, "rural", distortion, looks=4.0, rotation=1.0, scale=1.01)
+        sizes = {"rotation": 1.0, "scale": 1.01} if distortion == "similarity" else {}
+        simulate(folder, 480, "rural", distortion, looks=4.0, **sizes)
         return SimulatedFiles(folder)
 
     return pair

@@ -62,6 +62,16 @@ class TestBadCalls:
         ),
         (
             ParameterError,
+            "fitted to tie points; .*holds a transform",
+            {"transform": "t.json", "tie_points": "points.gpkg", "model": "tps"},
+        ),
+        (
+            ParameterError,
+            "fitted to tie points: there are none",
+            {"input": "input.tif", "check_points": "check.csv", "model": "tps"},
+        ),
+        (
+            ParameterError,
             "consistency needs a transform",
             {"input": "input.tif", "back_transform": "back.json"},
         ),
@@ -133,7 +143,7 @@ class TestBadCalls:
         """Also with a report, where that is not what makes the call complete."""
         before = listing(tmp_path)
         values = {
-            name: value if name == "max_error" else files.path(value)
+            name: value if name in ("max_error", "model") else files.path(value)
             for name, value in options.items()
         }
         with pytest.raises(error, match=message):

@@ -71,6 +71,17 @@ def test_a_pair_is_registered_with_all_its_files(
 
 
 @pytest.mark.slow
+def test_results_state_notes_on_the_matching(registration: tuple[Registration, Path]) -> None:
+    found, note = registration[0], "chips alone"
+    assert found.evidence is not None
+    assert note not in "\n".join(found.lines())
+    estimate = replace(found.evidence.estimate, notes=(note,))
+    noted = replace(found, evidence=replace(found.evidence, estimate=estimate))
+    assert note in noted.lines()
+    assert noted.summary()["notes"][-1] == note
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("image", ["reference", "input"])
 def test_keypoints_that_a_classifier_leaves_out_take_no_part(
     files: TexturedPair, tmp_path: Path, image: str

@@ -65,6 +65,16 @@ def test_the_shift_is_as_long_as_asked_for(tmp_path: Path, size: float) -> None:
     np.testing.assert_allclose(np.hypot(*off.T), size, atol=1e-6)
 
 
+def test_the_smallest_scene_is_warped_by_what_it_can_bear(tmp_path: Path) -> None:
+    simulate(tmp_path, 64, shift=0.0)
+    truth = load_transform(tmp_path / "truth.json")
+    with rasterio.open(tmp_path / "reference.tif") as reference:
+        corners = [(0, 0), (0, 63), (63, 0), (63, 63)]
+        xy = np.array([reference.xy(row, col) for row, col in corners])
+    off = truth(xy) - [[col, row] for row, col in corners]
+    assert 2.5 < np.hypot(*off.T).max() < 3.2
+
+
 def test_parameters_reach_the_pair(tmp_path: Path) -> None:
     simulate(
         tmp_path,
@@ -132,6 +142,9 @@ def test_more_looks_are_less_speckle(tmp_path: Path) -> None:
         ({"distortion": "none"}, ParameterError),
         ({"size": 96, "input_pixel_size": 20.0}, ParameterError),
         ({"size": 96, "warp": 40.0}, ParameterError),
+        ({"size": 96, "distortion": "shift", "warp": 4.0}, ParameterError),
+        ({"size": 96, "distortion": "scale", "rotation": 1.0}, ParameterError),
+        ({"size": 96, "scale": 1.1}, ParameterError),
         ({"folder": "a file"}, OutputError),
     ],
 )

@@ -260,6 +260,13 @@ def test_tie_points_say_how_well_they_fit(tmp_path: Path) -> None:
     assert shift.fit.check_rmse_px > 0.5
 
 
+def test_a_stored_transform_takes_no_model(tmp_path: Path) -> None:
+    path, transform = misregistered(tmp_path / "a.tif"), stored(tmp_path / "t.json")
+    with pytest.raises(ParameterError, match=r"fitted to tie points; .*t\.json holds a transform"):
+        warp(path, tmp_path / "out.tif", transform, model="tps")
+    assert not (tmp_path / "out.tif").exists()
+
+
 def test_rigid_models_preserve_shapes_also_in_degrees(tmp_path: Path) -> None:
     """On a map in degrees at 60° north, a turned image is turned on the ground."""
     lonlat = CRS.from_epsg(4326)

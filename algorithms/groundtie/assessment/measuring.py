@@ -20,7 +20,7 @@ from ..geometry.tie_points import NONE_HELD_OUT, TiePoints
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import reproject, require_both_or_none
 from ..rasters.reading import RasterSource
-from ..registration.stored_transform import load_stored, transform_of
+from ..registration.stored_transform import load_stored, require_no_model, transform_of
 from .accuracy import Assessment
 from .consistency import Leg, consistency
 from .point_errors import PointErrors
@@ -60,18 +60,19 @@ class AssessmentFiles:
         by_eye = has_report and None not in images.values()
         if not (by_points or by_eye or by_consistency):
             raise ParameterError(
-                "there is nothing to judge by: give check_points, tie_points, back_transform, or "
-                "reference, input and report"
+                "there is nothing to judge by: give check_points, tie_points or back_transform, or "
+                "both images and a report"
             )
         if max_error_px is not None and not by_points:
             raise ParameterError("max_error needs points: give check_points or tie_points")
         check_different({name: path for name, path in images.items() if path is not None})
 
     def registration(
-        self, model: str, reference: RasterSource | None, input: RasterSource | None
+        self, model: str | None, reference: RasterSource | None, input: RasterSource | None
     ) -> Transform:
         """Return the measured transform: the given one, `model` of tie points, or the nominal."""
         if self.transform is not None:
+            require_no_model(model, self.transform)
             found = load_transform(self.transform)
             return found if input is None else transform_of(found, input, self.transform)
         if input is None:
@@ -80,6 +81,8 @@ class AssessmentFiles:
             )
         if self.tie_points is not None:
             return load_stored(self.tie_points, model, input)[0]
+        if model is not None:
+            raise ParameterError("a model (model) is fitted to tie points: there are none")
         crs = input.grid.crs if reference is None else reference.grid.crs
         require_both_or_none(crs, input.grid.crs, f"{input.path} and the reference")
         return Transform.nominal(crs, input.grid)

@@ -11,6 +11,7 @@ from ..declaration import Tool
 from ..rasters.atomic import Outputs, write_csv, write_json
 from ..runs import run_tags
 from ..version import __version__
+from ..wording import counted
 from .calls import Call
 from .work import DONE, EXIT_CODES, Outcome
 
@@ -107,8 +108,7 @@ class BatchResult:
         counts = [f"{count} {status}" for status, count in self.counts.items()]
         counts += [f"{self.resumed} of them in an earlier run"] if self.resumed else []
         bad = [row for row in self.rows if row.outcome.status != DONE]
-        rows = "1 row" if len(self.rows) == 1 else f"{len(self.rows)} rows"
-        lines = [f"{rows}: {', '.join(counts)}"]
+        lines = [f"{counted(len(self.rows), 'row')}: {', '.join(counts)}"]
         lines += [
             f"row {row.call.row} ({row.call.name}) {row.outcome.status}: {row.outcome.message}"
             for row in bad[:_LINES]

@@ -48,11 +48,14 @@ class Estimate:
         The points of the fit, rejected ones included.
     fold_models
         See `Fitted`.
+    notes
+        What a user should know about how the points were matched.
     """
 
     transform: Transform
     points: TiePoints
     fold_models: tuple[PointFunction, ...]
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(

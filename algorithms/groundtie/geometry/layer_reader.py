@@ -33,6 +33,8 @@ def layer_of(path: str) -> dict[str, Any]:
                     for feature in layer
                 ],
             }
+    except UnicodeDecodeError:
+        return {"error": "its texts are not in UTF-8"}
     # A damaged file may raise any class of error.
     except Exception as error:
         return {"error": str(error) or type(error).__name__}

@@ -28,6 +28,7 @@ from ..rasters.grid import (
 )
 from ..runs import run_tags
 from ..strict_json import read_json
+from ..wording import reason_of
 from .drawn_points import follow_lines, line_ends
 from .georeferencer import SUFFIX as GEOREFERENCER
 from .georeferencer import read_georeferencer, write_georeferencer
@@ -150,7 +151,7 @@ def read_tie_points(
         edited |= numbers(rows, EDITED) > 0
         return replace(points, more={**points.more, EDITED: edited.astype(float)})
     except (OSError, ValueError, KeyError, TypeError, OverflowError, CRSError, csv.Error) as error:
-        reason = f"column {error} is missing" if isinstance(error, KeyError) else error
+        reason = f"column {error} is missing" if isinstance(error, KeyError) else reason_of(error)
         raise TransformFileError(f"cannot read the tie points {path}: {reason}") from error
 
 

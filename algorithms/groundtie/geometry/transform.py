@@ -28,6 +28,7 @@ from ..rasters.grid import (
     reproject,
 )
 from ..strict_json import read_json
+from ..wording import reason_of
 from .models import DEGREE, TERRAIN, Frame, Model, PolynomialModel, ThinPlateSpline, shift_model
 from .terrain_model import TerrainModel
 
@@ -208,7 +209,7 @@ def load_transform(path: str | Path) -> Transform:
     except TransformFileError as error:
         raise TransformFileError(f"{path}: {error}") from error
     except (OSError, ValueError) as error:
-        raise TransformFileError(f"cannot read the transform {path}: {error}") from error
+        raise TransformFileError(f"cannot read the transform {path}: {reason_of(error)}") from error
 
 
 def model_from_json(

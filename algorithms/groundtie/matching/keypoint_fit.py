@@ -7,7 +7,7 @@ outliers anywhere in the gate; a robust fit finds the inliers, which chips may r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ _CHIP_CELLS = 14
 # Forests and cities have more keypoints than fields, and relief displacement. To keep them from
 # outvoting the ground, the number of matches per cell is limited.
 _CELL_PX, _PER_CELL = 64.0, 6
+
+_CHIPS_ALONE = "too few keypoints match: the model is that of chips alone"
 
 # Correct matches lie within this distance of the polynomial that a thin-plate spline refines.
 _TPS_RADIUS_PX = 5.0
@@ -93,7 +95,8 @@ class KeypointFit:
         except TooFewPointsError:
             # With chips, "auto" could choose a more flexible model than keypoints may have.
             chips_kind = "affine" if kind == AUTO else kind
-            return self.chips.estimate(coarse, chips_kind, context.part(0.7, 1.0))
+            found = self.chips.estimate(coarse, chips_kind, context.part(0.7, 1.0))
+            return replace(found, notes=(_CHIPS_ALONE,))
         try:
             refined = self._refined(first, matches, coarse, fit, context.part(0.7, 1.0))
         except TooFewPointsError:

@@ -17,9 +17,9 @@ from ..geometry.models import Model
 from ..kinds import AUTO
 from ..rasters.colours import Colours
 from ..rasters.grid import FloatArray, PointFunction
-from ..rasters.pair import ImagePair
+from ..rasters.pair import ImagePair, window_below
 from ..rasters.patch import Patch, middle_window
-from ..rasters.reading import FloatImage
+from ..rasters.reading import FloatImage, Window
 from ..similarity.pooled import PooledHistogram, smooth
 from ..similarity.surface import SimilaritySettings, normalise
 from .belief_propagation import Surfaces
@@ -73,7 +73,10 @@ class PooledHistogramMatcher:
         other = getattr(pair, plain._searched)
         if not other.has_colours:
             return plain
-        window = middle_window(other.source.grid)
+        # Another part of a large file may show other land, or nothing.
+        part = window_below(other.source.grid, pair.surroundings)
+        col, row, *size = middle_window(other.source.grid.window(*part))
+        window = Window(part.col + col, part.row + row, *size)
         bands, valid = other.source.read_bands(window, other.source.image_bands)
         if valid.all(axis=0).sum() < _LEAST_PIXELS:
             return plain

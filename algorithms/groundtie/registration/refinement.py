@@ -28,6 +28,7 @@ from ..sensor.height_check import HeightCheck, check_heights
 from ..sensor.heights import ConstantHeight, Heights
 from ..sensor.orientation import sensor_grid
 from ..sensor.rpc_fit import RPCFit
+from ..wording import signed
 from .evidence import AGREEMENT, ERROR, REFINEMENT, Agreement, outside_hull
 from .ground_control import GroundControl
 from .sensor_input import OrientedImage
@@ -316,8 +317,8 @@ class RefinedRpc:
             *self.tried,
             f"accepted: {verdict.reason}",
             verdict.model_line(bias.kind),
-            f"shift in the middle of the image: {shift[0]:+.2f} ± {sigma[0]:.2f}, "
-            f"{shift[1]:+.2f} ± {sigma[1]:.2f} px (column, row)",
+            f"shift in the middle of the image: {signed(shift[0])} ± {sigma[0]:.2f}, "
+            f"{signed(shift[1])} ± {sigma[1]:.2f} px (column, row)",
             f"error at {evidence.held_out.name}: {evidence.before.rmse:.2f} px before, "
             f"{evidence.after.rmse:.2f} px after",
             verdict.accuracy_line(),

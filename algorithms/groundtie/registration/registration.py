@@ -145,6 +145,13 @@ class Registration:
         """The survey by chips all over the overlap; None: there was none."""
         return None if self.evidence is None else self.evidence.surveys.whole
 
+    def notes(self) -> list[str]:
+        """Return notes for the user on how the images were read and matched."""
+        return [
+            *self.pair.notes(),
+            *(() if self.evidence is None else self.evidence.estimate.notes),
+        ]
+
     def accepted_transform(self) -> Transform:
         """Return the transform of an accepted registration."""
         assert self.verdict.accepted and self.transform is not None
@@ -319,7 +326,7 @@ class Registration:
                 f"chance 1 in 10^{-v.log10_chance:.0f}",
                 *coverage_lines(self.survey),
             ]
-            lines += self.pair.notes()
+            lines += self.notes()
             if self.mask.image is not None:
                 lines.append(self.mask.line())
             if self.beyond is not None:

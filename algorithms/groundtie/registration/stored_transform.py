@@ -6,7 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import GeoreferencingError, NoOverlapError, NotRegisteredError, TransformFileError
+from ..errors import (
+    GeoreferencingError,
+    NoOverlapError,
+    NotRegisteredError,
+    ParameterError,
+    TransformFileError,
+)
 from ..geometry.tie_point_files import read_tie_points
 from ..geometry.transform import Transform, load_transform
 from ..rasters.grid import FloatArray, Grid, finite, require_both_or_none
@@ -14,9 +20,12 @@ from ..rasters.reading import RasterSource
 from .tie_point_evidence import TiePointEvidence, TiePointFit
 from .verdict import decide
 
+# The kind of model that is fitted to stored tie points by default.
+USUAL_MODEL = "affine"
+
 
 def load_stored(
-    path: Path, model: str, source: RasterSource
+    path: Path, model: str | None, source: RasterSource
 ) -> tuple[Transform, TiePointFit | None]:
     """Return a stored transform, or one that is fitted to stored tie points, and its fit.
 
@@ -25,12 +34,14 @@ def load_stored(
     path
         A `.json` with a transform, or a file of tie points.
     model
-        The kind of model that is fitted to tie points.
+        The kind of model that is fitted to tie points; None: `USUAL_MODEL`.
     source
         The raster that tie points are meant for.
 
     Raises
     ------
+    ParameterError
+        A kind of model is given for a transform.
     TransformFileError
         The file cannot be read or understood.
     TooFewPointsError
@@ -39,6 +50,7 @@ def load_stored(
         A rule refuses the tie points.
     """
     if path.suffix.lower() == ".json":
+        require_no_model(model, path)
         return load_transform(path), None
     points = read_tie_points(path, source.grid)
     if points.crs is None and source.grid.crs is not None:
@@ -47,11 +59,19 @@ def load_stored(
         Transform.nominal(points.crs, source.grid).nominal_xy(points.input_px)
     ).all():
         raise TransformFileError(f"{path} holds points that lie outside of their map's projection")
-    evidence = TiePointEvidence.of(points, model, source.grid)
+    evidence = TiePointEvidence.of(points, model or USUAL_MODEL, source.grid)
     verdict = decide(evidence)
     if not verdict.accepted:
         raise NotRegisteredError(f"{path}: {verdict.sentence()}")
     return evidence.transform, evidence.fit()
+
+
+def require_no_model(model: str | None, transform: Path) -> None:
+    """Raise `ParameterError` if a kind of model is given for a stored transform."""
+    if model is not None:
+        raise ParameterError(
+            f"a model (model) is fitted to tie points; {transform} holds a transform, which has one"
+        )
 
 
 def transform_of(found: Transform, source: RasterSource, name: object) -> Transform:

@@ -18,6 +18,7 @@ from ..geometry.models import DEGREE, SHAPE_PRESERVING, Frame, fewest_points, mo
 from ..geometry.tie_points import TiePoints
 from ..geometry.transform import Transform
 from ..rasters.grid import FloatArray, Grid, apply_affine, metres_per_unit_at
+from ..wording import counted
 from .evidence import TIE_POINTS
 
 # Models that do not mirror.
@@ -65,8 +66,8 @@ class TiePointFit:
             error = f"{self.check_rmse_px:.2f} px (RMSE)"
             lines.append(f"error at {self.check_points} check points: {error}")
         if self.edited:
-            edited = "1 point" if self.edited == 1 else f"{self.edited} points"
-            lines.append(f"edited by hand: {edited}; of lines the ends count, not the columns")
+            edited = f"edited by hand: {counted(self.edited, 'point')}"
+            lines.append(f"{edited}; of lines the ends count, not the columns")
         return lines
 
 

@@ -38,7 +38,7 @@ class Report(Page):
             "correction": None if correction is None else correction.summary(),
             "transform": None if transform is None else transform.to_json(),
             "mask": found.mask.summary(),
-            "notes": found.pair.notes(),
+            "notes": found.notes(),
             "scene": found.scene.summary(),
             **parts.coverage_numbers(survey),
             **({} if survey is None else {"parts": parts.summary(survey)}),
@@ -53,7 +53,7 @@ class Report(Page):
         return {
             "verdict": found.verdict,
             "grid": pair.grid,
-            "notes": [*pair.notes(), found.mask.line(), *beyond],
+            "notes": [*found.notes(), found.mask.line(), *beyond],
             "metres": pair.grid.metres_per_pixel,
             "model": None if found.transform is None else found.transform.model.kind,
             "correction": found.correction,

@@ -18,6 +18,7 @@ from ..raster_names import GEOTIFF
 from ..rasters.grid import LON_LAT, FloatArray
 from ..rasters.handles import FileHandles
 from ..strict_json import read_json
+from ..wording import reason_of
 
 # Rasters with GDAL's GCPs in their tags.
 RASTERS = (*GEOTIFF, ".vrt")
@@ -66,7 +67,8 @@ def read_others(path: Path, image: str) -> TiePoints | None:
         AttributeError,
         OverflowError,
     ) as error:
-        raise TransformFileError(f"cannot read the ground control {path}: {error}") from error
+        reason = reason_of(error)
+        raise TransformFileError(f"cannot read the ground control {path}: {reason}") from error
 
 
 def _points(xy: FloatArray, px: FloatArray, height_m: FloatArray, crs: CRS) -> TiePoints:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from ..rasters.grid import FloatArray
 from ..registration.evidence import DateEvidence
 from ..registration.verdict import Verdict, decide
+from ..wording import counted
 from .closure import Closure, triplet_closures
 from .frame import SeriesFrame
 from .network import Adjustment, Link, adjust
@@ -180,8 +181,8 @@ class _AdjustedNetwork:
 
 
 def _accepted(evidence: DateEvidence) -> str:
-    noun = "registration" if evidence.links == 1 else "registrations"
+    links = counted(evidence.links, "registration")
     if not evidence.is_confirmed:
-        return f"{evidence.links} {noun}, in no loop"
+        return f"{links}, in no loop"
     way = ", reached by other dates" if evidence.is_refused_by_hub else ""
-    return f"{evidence.links} {noun}, confirmed by loops{way}"
+    return f"{links}, confirmed by loops{way}"

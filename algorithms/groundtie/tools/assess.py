@@ -23,6 +23,7 @@ from ..rasters.atomic import Outputs
 from ..rasters.reading import open_raster
 from ..registration.verdict import Verdict
 from ..report.assessment_report import PART_LABELS, AssessmentReport
+from ..wording import signed
 from .parameters import general
 
 
@@ -74,8 +75,8 @@ def _lines(label: str, errors: PointErrors) -> list[str]:
     ]
     return [
         f"{label}: {errors.used.sum()} of {len(errors)} points, {', '.join(lengths)}",
-        f"  bias {px.bias[0]:+.2f}, {px.bias[1]:+.2f} px, standard deviation {px.std[0]:.2f}, "
-        f"{px.std[1]:.2f} px (columns, rows)",
+        f"  bias {signed(px.bias[0])}, {signed(px.bias[1])} px, "
+        f"standard deviation {px.std[0]:.2f}, {px.std[1]:.2f} px (columns, rows)",
     ]
 
 
@@ -190,13 +191,13 @@ def assess(
         ),
     ] = None,
     model: Annotated[
-        str,
+        str | None,
         Choice(
-            help="What is fitted to tie points where there is no transform.",
+            help="What is fitted to tie points where there is no transform; affine by default.",
             choices=KINDS,
             advanced=True,
         ),
-    ] = "affine",
+    ] = None,
     progress: Progress = SILENT,
     parameters: Values = NO_VALUES,
 ) -> AssessmentResult:

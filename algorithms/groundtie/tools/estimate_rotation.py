@@ -24,6 +24,7 @@ from ..report.correction import turn_in_words
 from ..report.rotation_picture import draw_rotation
 from ..similarity.surface import SimilaritySettings
 from ..studies.pose_searches import DEFAULT_SEARCH, HISTOGRAM_SEARCHES, SEARCHES
+from ..wording import signed
 from .parameters import general
 
 
@@ -79,7 +80,7 @@ class RotationResult:
         return [
             f"rotation: {turn_in_words(self.pose.rotation_deg) or 'none'}",
             f"scale: {self.pose.scale:.4f}",
-            f"shift: {self.right:+.2f} {self.unit} right, {self.down:+.2f} {self.unit} down",
+            f"shift: {signed(self.right)} {self.unit} right, {signed(self.down)} {self.unit} down",
             f"accepted: {self.verdict.reason}; height {self.evidence.height:.1f}, "
             f"{self.evidence.rival_ratio:.2f} times that of the best elsewhere",
             self.verdict.accuracy_line(),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
 from ..declaration import tool
+from ..errors import ParameterError
 from ..kinds import Choice, Distance, FolderOut, Number
 from ..progress import SILENT, Progress
 from ..simulation.files import write_pair
@@ -16,6 +18,14 @@ from ..simulation.sar import SarOptions
 from ..simulation.scene import SceneOptions
 from .parameters import general, simulated
 from .results import SimulatedScene
+
+# Values by default, and the distortions that have them. A warp is at most a twentieth of the side.
+_USUAL = {"rotation": 2.0, "scale": 1.02, "warp": 4.0}
+_OF_DISTORTIONS = {
+    "rotation": ("rotation", "similarity"),
+    "scale": ("scale", "similarity"),
+    "warp": ("affine", "polynomial"),
+}
 
 
 @tool(title="Simulate a SAR–optical pair", group="Simulation")
@@ -98,34 +108,37 @@ def simulate(
     off_nadir: simulated.OffNadir = 12.0,
     view_azimuth: simulated.ViewAzimuth = 250.0,
     rotation: Annotated[
-        float,
+        float | None,
         Number(
-            help="Rotation of the optical image, for distortions rotation and similarity.",
+            help="Rotation of the optical image, for distortions rotation and similarity; by "
+            "default 2°.",
             unit="°",
             minimum=-30,
             maximum=30,
             advanced=True,
         ),
-    ] = 2.0,
+    ] = None,
     scale: Annotated[
-        float,
+        float | None,
         Number(
-            help="Scale of the optical image, for distortions scale and similarity.",
+            help="Scale of the optical image, for distortions scale and similarity; by default "
+            "1.02.",
             minimum=0.8,
             maximum=1.25,
             advanced=True,
         ),
-    ] = 1.02,
+    ] = None,
     warp: Annotated[
-        float,
+        float | None,
         Number(
-            help="Largest displacement besides the shift, for distortions affine and polynomial.",
+            help="Largest displacement besides the shift, for distortions affine and polynomial; "
+            "by default 4 px, less in images below 80 px.",
             unit="px",
             minimum=0,
             maximum=50,
             advanced=True,
         ),
-    ] = 4.0,
+    ] = None,
     progress: Progress = SILENT,
 ) -> SimulatedScene:
     """Simulate a SAR–optical pair whose misregistration is known exactly.
@@ -135,13 +148,28 @@ def simulate(
     input may be orthorectified with wrong heights. The same seed gives the same pair. The file
     truth.json is a transform like those of `coregister`.
     """
+    side_px = int(size * pixel_size / (input_pixel_size or pixel_size))
     options = PairOptions(
         scene=SceneOptions((size, size), pixel_size, density, relief, seed, changed / 100, slope),
         sar=SarOptions(incidence_deg=incidence, orbit=orbit, looks=looks),
         optical=OpticalOptions(view_azimuth_deg=view_azimuth, off_nadir_deg=off_nadir),
-        distortion=DistortionOptions(distortion, shift, rotation, scale, warp),
+        distortion=_distortion(
+            distortion, shift, {"rotation": rotation, "scale": scale, "warp": warp}, side_px
+        ),
         input_pixel_size_m=input_pixel_size,
         input=input,
         terrain_error_m=terrain_error,
     )
     return SimulatedScene(write_pair(simulate_pair(options, progress), folder))
+
+
+def _distortion(
+    kind: str, shift_px: float, asked: Mapping[str, float | None], side_px: int
+) -> DistortionOptions:
+    for name, value in asked.items():
+        if value is not None and kind not in _OF_DISTORTIONS[name]:
+            those = " and ".join(_OF_DISTORTIONS[name])
+            raise ParameterError(f"a {name} ({name}) goes with the distortions {those}, not {kind}")
+    usual = {**_USUAL, "warp": min(_USUAL["warp"], side_px // 20)}
+    given = {name: value for name, value in asked.items() if value is not None}
+    return DistortionOptions(kind, shift_px, *(usual | given).values())

@@ -69,12 +69,13 @@ def warp(
         general.pixel_size_of_result(", where it does not get the reference's grid"),
     ] = None,
     model: Annotated[
-        str,
+        str | None,
         Choice(
-            help="What is fitted to tie points; a stored transform has a model already.",
+            help="What is fitted to tie points, affine by default; a stored transform has a model "
+            "already.",
             choices=KINDS,
         ),
-    ] = "affine",
+    ] = None,
     resampling: general.Resampling = "cubic",
     workers: general.Workers = None,
     progress: Progress = SILENT,

@@ -812,8 +812,8 @@
       <translation>Lanczos</translation>
     </message>
     <message>
-      <source>Largest displacement besides the shift, for distortions affine and polynomial.</source>
-      <translation>Größter Versatz neben der Verschiebung, für die Verzerrungen affin und Polynom.</translation>
+      <source>Largest displacement besides the shift, for distortions affine and polynomial; by default 4 px, less in images below 80 px.</source>
+      <translation>Größter Versatz neben der Verschiebung, für die Verzerrungen affin und Polynom; ohne Angabe 4 px, in Bildern unter 80 px weniger.</translation>
     </message>
     <message>
       <source>Largest error</source>
@@ -1460,8 +1460,8 @@
       <translation>Drehung (°)</translation>
     </message>
     <message>
-      <source>Rotation of the optical image, for distortions rotation and similarity.</source>
-      <translation>Drehung des optischen Bildes, für die Verzerrungen Drehung und Ähnlichkeit.</translation>
+      <source>Rotation of the optical image, for distortions rotation and similarity; by default 2°.</source>
+      <translation>Drehung des optischen Bildes, für die Verzerrungen Drehung und Ähnlichkeit; ohne Angabe 2°.</translation>
     </message>
     <message>
       <source>Rotation steps</source>
@@ -1536,8 +1536,8 @@
       <translation>Maßstab</translation>
     </message>
     <message>
-      <source>Scale of the optical image, for distortions scale and similarity.</source>
-      <translation>Maßstab des optischen Bildes, für die Verzerrungen Maßstab und Ähnlichkeit.</translation>
+      <source>Scale of the optical image, for distortions scale and similarity; by default 1.02.</source>
+      <translation>Maßstab des optischen Bildes, für die Verzerrungen Maßstab und Ähnlichkeit; ohne Angabe 1,02.</translation>
     </message>
     <message>
       <source>Scheduler</source>
@@ -2056,12 +2056,12 @@
       <translation>Was verglichen wird; Automatisch nimmt, was zur Suche passt: Transinformation, wo sie steigt, sonst die Richtung der Kanten. Drehschritte nehmen immer letztere; die Kreuzkorrelation vergleicht Grauwerte.</translation>
     </message>
     <message>
-      <source>What is fitted to tie points where there is no transform.</source>
-      <translation>Was an Verknüpfungspunkte angepasst wird, wo keine Transformation ist.</translation>
+      <source>What is fitted to tie points where there is no transform; affine by default.</source>
+      <translation>Was an Verknüpfungspunkte angepasst wird, wo keine Transformation ist; ohne Angabe affin.</translation>
     </message>
     <message>
-      <source>What is fitted to tie points; a stored transform has a model already.</source>
-      <translation>Was an Verknüpfungspunkte angepasst wird; eine gespeicherte Transformation hat schon ein Modell.</translation>
+      <source>What is fitted to tie points, affine by default; a stored transform has a model already.</source>
+      <translation>Was an Verknüpfungspunkte angepasst wird, ohne Angabe affin; eine gespeicherte Transformation hat schon ein Modell.</translation>
     </message>
     <message>
       <source>What is installed</source>

@@ -16,6 +16,7 @@ from ...kinds import (
     Number,
     RasterIn,
     RasterOut,
+    SurfaceIn,
     Text,
     VectorOut,
     Views,
@@ -130,7 +131,7 @@ SURFACE_HEIGHTS = (
     "Heights of roofs, canopies and ground (DSM), or a vector layer of buildings with a field "
     "height in metres."
 )
-SURFACE_MODEL = MaskIn(
+SURFACE_MODEL = SurfaceIn(
     help=f"{SURFACE_HEIGHTS} Only ground that both images show takes part: no layover, radar "
     "shadow, relief displacement or cast shadow. Needs the views of both images.",
     advanced=True,
