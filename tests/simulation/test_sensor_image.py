@@ -22,7 +22,7 @@ from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
 from groundtie.simulation.attitude import AttitudeOptions
 from groundtie.simulation.optical import OpticalOptions, blur, render_radiance
 from groundtie.simulation.sar import SarOptions
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import SceneOptions, generate_scenes
 from groundtie.simulation.sensor_files import (
     CHECK_POINT_COLUMNS,
     NAMES,
@@ -124,7 +124,7 @@ class TestPicture:
         """GDAL's orthorectification by exact RPCs and DEM is the simulator's own orthoimage."""
         ortho = gdal_ortho(paths)
         margin = (made.terrain.grid.width - made.reference_grid.width) // 2
-        scene = generate_scene(OPTIONS.scene, margin)
+        scene = generate_scenes(OPTIONS.scene, margin).radar
         radiance = render_radiance(scene, OPTIONS.optical)[0]
         blur(radiance, OPTIONS.optical.psf_sigma_px)
         expected = radiance[margin:-margin, margin:-margin]
