@@ -21,7 +21,7 @@ from .held import SENSOR_BYTES, require_memory
 from .misregistration import Positions
 from .noise import strips
 from .optical import OpticalOptions
-from .pair import camera_image, in_steps, map_grid, object_reach_px, scene_grid
+from .pair import camera_image, in_steps, map_grid, object_reach_px
 from .sar import SarOptions, render_sar
 from .scene import SceneOptions, generate_scenes
 
@@ -164,7 +164,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     error = AttitudeError.draw(options.attitude, size, pixel_m, scene_options.seed)
     progress.update(0.0, "laying out the scene")
     margin = _margin_px(options, grid, camera, error)
-    around = scene_grid(grid, margin)
+    around = grid.widened(margin)
     require_memory(around, grid, SENSOR_BYTES)
     scenes = generate_scenes(scene_options, margin)
     terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), around)
