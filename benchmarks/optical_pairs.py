@@ -19,7 +19,7 @@ from groundtie.simulation.misregistration import (
     resample,
 )
 from groundtie.simulation.optical import OpticalOptions, blur, quantise, render_radiance
-from groundtie.simulation.pair import map_grid, scene_grid
+from groundtie.simulation.pair import map_grid
 from groundtie.simulation.scene import SceneOptions, generate_scenes
 
 from .attempt import Pair
@@ -83,6 +83,6 @@ class OpticalPair:
         write_image(image[None], grid.transform, folder / NAMES["reference"])
         light = render_radiance(later, _LATER)[0]
         blur(light, _LATER.psf_sigma_px)
-        seen = resample(light, Positions.interpolated(truth, scene_grid(grid, around)))
+        seen = resample(light, Positions.interpolated(truth, grid.widened(around)))
         write_image(quantise(seen, _LATER, noise[1])[None], grid.transform, folder / NAMES["input"])
         write_json(folder / NAMES["truth"], truth.to_json())

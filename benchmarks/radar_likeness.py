@@ -16,7 +16,7 @@ from groundtie.masks.scene import Scene
 from groundtie.masks.town import share_of_strong_scatterers
 from groundtie.rasters.reading import Window, open_raster
 from groundtie.simulation.sar import SarOptions, render_sar
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import SceneOptions, generate_scenes
 from groundtie.speckle.statistics import estimate_looks, local_statistics
 
 from .cases import SAR_SAR, read_cases
@@ -170,7 +170,9 @@ def simulated_images(seeds: Iterable[int]) -> Iterator[Likeness]:
     for kind, (pixel_m, looks) in SIMULATED.items():
         for seed in seeds:
             options = SceneOptions((SIZE_PX, SIZE_PX), pixel_m, kind.split(",")[0], seed=seed)
-            image = render_sar(generate_scene(options, _MARGIN_PX), SarOptions(40.0, looks=looks))
+            image = render_sar(
+                generate_scenes(options, _MARGIN_PX).radar, SarOptions(40.0, looks=looks)
+            )
             amplitude = image.astype(np.float32)
             yield likeness(f"seed {seed}", f"simulated, {kind}", amplitude)
 

@@ -26,7 +26,7 @@ from groundtie.simulation.cover import Cover
 from groundtie.simulation.optical import OpticalOptions
 from groundtie.simulation.sar import SarOptions, sar_power
 from groundtie.simulation.scene import Scene as Country
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import SceneOptions, generate_scenes
 
 GRID = utm_grid(200, 180, 1.0)
 CAPE = Grid(Affine(-1, 0, 100, 0, 1, 3_320_000), CRS.from_epsg(2048), 200, 180)
@@ -202,7 +202,7 @@ def test_directions_follow_the_map_not_the_pixels(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def country() -> Country:
     options = SceneOptions((220, 220), density="city", relief_m=10, seed=4)
-    return generate_scene(options, margin_px=128)
+    return generate_scenes(options, margin_px=128).radar
 
 
 @pytest.fixture(scope="module")

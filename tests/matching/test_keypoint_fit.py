@@ -193,7 +193,7 @@ def test_the_coarse_model_is_taken_where_keypoints_agree_on_a_wrong_one(
 def test_tiles_change_next_to_nothing(files: TexturedPair, monkeypatch: pytest.MonkeyPatch) -> None:
     with files.opened() as pair, threads(2) as context:
         whole = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, GATE_PX, context)
-        monkeypatch.setattr(tiles, "_TILE_PX", 128)
+        monkeypatch.setattr(keypoints, "TILE_PX", 128)
         parts = KeypointMatcher(pair, *KEYPOINTS).match(COARSE, GATE_PX, context)
 
     def places(matches: Correspondences) -> set[tuple[float, ...]]:

@@ -28,24 +28,24 @@ def test_streets_are_8_to_30_m_wide() -> None:
 class TestBuilders:
     def test_everything_stands_inside_the_block(self, build: Builder) -> None:
         shrunk = rectangle((200, 150), (60 + 1e-6, 45 + 1e-6), 0.3)
-        corners = [c for b in built(build) for outline, _ in b.parts for c in outline]
+        corners = [c for b in built(build) for outline, _ in b for c in outline]
         assert corners
         assert all(contains(shrunk, corner) for corner in corners)
 
     def test_nothing_is_higher_than_said(self, build: Builder) -> None:
         for seed in range(20):
             for building in build(BLOCK, 1.0, np.random.default_rng(seed)):
-                assert min(h for _, h in building.parts) > 0
-                assert max(h for _, h in building.parts) <= HIGHEST_M
+                assert min(h for _, h in building) > 0
+                assert max(h for _, h in building) <= HIGHEST_M
 
     def test_later_parts_are_higher_than_the_first(self, build: Builder) -> None:
         for building in built(build):
-            assert all(h > building.parts[0][1] for _, h in building.parts[1:])
+            assert all(h > building[0][1] for _, h in building[1:])
 
     def test_scale_changes_pixels_and_not_heights(self, build: Builder) -> None:
         double = [(2 * x, 2 * y) for x, y in BLOCK]
         for one, two in zip(built(build), built(build, 2.0, double), strict=True):
-            for (outline, height), (larger, same) in zip(one.parts, two.parts, strict=True):
+            for (outline, height), (larger, same) in zip(one, two, strict=True):
                 assert same == pytest.approx(height)
                 assert area(larger) == pytest.approx(4 * area(outline))
 
@@ -56,7 +56,7 @@ class TestPerimeter:
         for seed in range(10):
             drawn = np.zeros(image.shape, np.uint8)
             for building in perimeter(BLOCK, 1.0, np.random.default_rng(seed)):
-                cv2.fillConvexPoly(drawn, np.rint(building.parts[0][0]).astype(np.int32), 1)
+                cv2.fillConvexPoly(drawn, np.rint(building[0][0]).astype(np.int32), 1)
             image += drawn / 10
         row, column = np.mgrid[:300, :400]
         u = (column - 200) * np.cos(0.3) + (row - 150) * np.sin(0.3)

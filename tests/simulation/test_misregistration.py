@@ -23,7 +23,7 @@ from groundtie.simulation.misregistration import (
     resample,
 )
 from groundtie.simulation.optical import OpticalOptions, blur, render_radiance
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import SceneOptions, generate_scenes
 
 UTM = CRS.from_epsg(32633)
 GRID = Grid(Affine(2.0, 0, 412000, 0, -2.0, 5334000), UTM, 400, 300)
@@ -175,7 +175,7 @@ class TestResample:
 @pytest.fixture(scope="module")
 def light() -> np.ndarray:
     """An optical image of a town without noise, sharp as it is delivered."""
-    scene = generate_scene(SceneOptions((460, 360), seed=8))
+    scene = generate_scenes(SceneOptions((460, 360), seed=8)).radar
     image = render_radiance(scene, OpticalOptions(bands=("green",)))[0]
     blur(image, 0.8)
     return image

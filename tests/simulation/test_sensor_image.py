@@ -22,7 +22,7 @@ from groundtie.sensor.rpc_tags import rpc_from_tags, rpc_to_tags
 from groundtie.simulation.attitude import AttitudeOptions
 from groundtie.simulation.optical import OpticalOptions, blur, render_radiance
 from groundtie.simulation.sar import SarOptions
-from groundtie.simulation.scene import SceneOptions, generate_scene
+from groundtie.simulation.scene import SceneOptions, generate_scenes
 from groundtie.simulation.sensor_files import (
     CHECK_POINT_COLUMNS,
     NAMES,
@@ -123,8 +123,8 @@ class TestPicture:
     def test_gdal_brings_it_onto_the_map(self, made: SensorImage, paths: dict[str, Path]) -> None:
         """GDAL's orthorectification by exact RPCs and DEM is the simulator's own orthoimage."""
         ortho = gdal_ortho(paths)
-        margin = (made.terrain_grid.width - made.reference_grid.width) // 2
-        scene = generate_scene(OPTIONS.scene, margin)
+        margin = (made.terrain.grid.width - made.reference_grid.width) // 2
+        scene = generate_scenes(OPTIONS.scene, margin).radar
         radiance = render_radiance(scene, OPTIONS.optical)[0]
         blur(radiance, OPTIONS.optical.psf_sigma_px)
         expected = radiance[margin:-margin, margin:-margin]
@@ -204,10 +204,10 @@ class TestGround:
     ) -> None:
         corners = np.array([[0, 0], [399, 0], [0, 359], [399, 359]], float)
         for rpc in (made.exact.rpc, made.delivered.rpc):
-            for height in (made.terrain_m.min(), made.terrain_m.max()):
+            for height in (made.terrain.height_m.min(), made.terrain.height_m.max()):
                 lon_lat = rpc.localise(corners, float(height))
-                xy = reproject(lon_lat, LON_LAT, made.terrain_grid.crs)
-                assert made.terrain_grid.contains(made.terrain_grid.map_to_pixel(xy)).all()
+                xy = reproject(lon_lat, LON_LAT, made.terrain.grid.crs)
+                assert made.terrain.grid.contains(made.terrain.grid.map_to_pixel(xy)).all()
 
     def test_columns(self, paths: dict[str, Path]) -> None:
         assert tuple(table(paths["check_points"])) == CHECK_POINT_COLUMNS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..geometry.judging import SMALLEST_PX
-from ..rasters.atomic import write_csv, writing
+from ..rasters.atomic import write_csv, write_figure
 from ..rasters.grid import LON_LAT, FloatArray, metres_per_unit_at, near_longitude, reproject
 from ..report.figures import CHECK_COLOUR, FIT_COLOUR, round_length
 from ..sensor.control_points import ControlPoints
@@ -117,5 +117,4 @@ def draw_vectors(
         axes.set_xlim(0, size[0])
         axes.set_ylim(size[1], 0)
         axes.set_aspect("equal")
-    with writing(path):
-        figure.savefig(path, format="png", dpi=130, metadata={"Software": None})
+    write_figure(path, figure, 130)

@@ -18,10 +18,11 @@ from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import Image
 from ..rasters.patch import window_sums
 from ..rasters.reading import RasterSource, Window
+from ..rasters.tiling import tiles
 from ..rasters.warping import sample
 from .classifier_training import Training
 from .patch_statistics import BAND_RATIOS, NO_BANDS, PATCH_PX, patch_statistics
-from .tiles import MARGIN_PX, Detecting, inside, tiles
+from .tiles import MARGIN_PX, TILE_PX, Detecting, inside
 
 Labels = NDArray[np.int8]
 
@@ -237,4 +238,4 @@ def labelled_points(
         values = patch_statistics(statistics, patch, px, bands)
         return Training(values, label == KEPT, px + np.subtract(tile[:2], MARGIN_PX), looked_at)
 
-    return Training.concatenate(list(context.map(look, list(tiles(grid)))))
+    return Training.concatenate(list(context.map(look, list(tiles(grid, TILE_PX)))))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
 
-from ..rasters import tiling
-from ..rasters.grid import FloatArray, Grid
+from ..rasters.grid import FloatArray
 from ..rasters.patch import Patch
 from ..rasters.reading import FloatImage, Mask, Window
 from .keypoints import Keypoints
 
 # Side of tiles, and the margin beyond their border that keypoints near it depend on.
-_TILE_PX = 1024
+TILE_PX = 1024
 MARGIN_PX = 64
 
 
@@ -37,8 +35,3 @@ def inside(px: FloatArray, window: Window) -> Mask:
     at = np.rint(px)
     low = np.array([window.col, window.row])
     return np.asarray(np.all((at >= low) & (at < low + [window.width, window.height]), axis=1))
-
-
-def tiles(grid: Grid) -> Iterator[Window]:
-    """Return the tiles in which a grid is searched for keypoints."""
-    return tiling.tiles(grid, _TILE_PX)

@@ -81,10 +81,9 @@ class Resampled:
         context
             Threads.
         """
-        width, height = grid.width + 2 * reach_px, grid.height + 2 * reach_px
-        if width * height > _HELD_PIXELS:
+        around, quiet = grid.widened(reach_px), context.quiet()
+        if around.width * around.height > _HELD_PIXELS:
             return cls(pair, to_input)
-        around, quiet = grid.window(-reach_px, -reach_px, width, height), context.quiet()
         to_reference = pair.reference.source.grid.map_to_pixel
         held = (
             HeldImage.onto(pair.reference, around, to_reference, quiet),

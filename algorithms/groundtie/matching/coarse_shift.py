@@ -145,10 +145,7 @@ class LevelSearch:
     def _patches(self, model: Model, reach: int) -> tuple[Patch, Patch]:
         """Return the reference with a margin around the level, and the input with a wider one."""
         pair, level = self.pair, self.level
-        template, search = (
-            level.window(-more, -more, level.width + 2 * more, level.height + 2 * more)
-            for more in (BORDER_PX, reach)
-        )
+        template, search = level.widened(BORDER_PX), level.widened(reach)
         hidden = None if self.held_out is None else self.held_out(template)
         of_reference = template, pair.reference.source.grid.map_to_pixel, hidden
         of_input = search, pair.transform(model)

@@ -11,12 +11,13 @@ from ..context import Context
 from ..features.detectors import seen_whole
 from ..features.keypoints import Keypoints
 from ..features.matching import match_near
-from ..features.tiles import MARGIN_PX, Describing, Detecting, inside, tiles
+from ..features.tiles import MARGIN_PX, TILE_PX, Describing, Detecting, inside
 from ..geometry.models import Model
 from ..rasters.grid import FloatArray, Grid
 from ..rasters.pair import ImagePair
 from ..rasters.patch import Patch
 from ..rasters.reading import Mask, Window
+from ..rasters.tiling import tiles
 from .matcher import Correspondences, MaskOf
 
 # A keypoint lies in a part of an image if the part covers everything within this many of the
@@ -68,7 +69,7 @@ class KeypointMatcher:
             Threads and progress.
         """
         match_tile = partial(self._match_tile, coarse=model, gate=radius_px)
-        parts = context.map(match_tile, list(tiles(self.pair.grid)))
+        parts = context.map(match_tile, list(tiles(self.pair.grid, TILE_PX)))
         px, partner_px, ratio = map(np.concatenate, zip(*parts, strict=True))
         # The farther the next descriptor in the gate, the better the match.
         score = 1 / np.maximum(ratio, 1 / _LARGEST_SCORE)

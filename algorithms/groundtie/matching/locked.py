@@ -96,9 +96,7 @@ class LockedContent:
         return _inner(covered(drawn_edges(*self._around(piece)), _EDGE_SURROUNDINGS_PX))
 
     def _around(self, piece: Grid) -> tuple[Patch, Patch]:
-        size = piece.width + 2 * _RIM_PX, piece.height + 2 * _RIM_PX
-        around = piece.window(-_RIM_PX, -_RIM_PX, *size)
-        return Resampled(self.pair, self.to_input).read(around)
+        return Resampled(self.pair, self.to_input).read(piece.widened(_RIM_PX))
 
 
 def _inner(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

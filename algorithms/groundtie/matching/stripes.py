@@ -82,8 +82,7 @@ def _of_piece(
 ) -> FarPlace:
     factor, reach = level_factor(piece), SURVEY_RADIUS_PX
     level = piece.scaled(factor)
-    wide = level.window(-reach, -reach, level.width + 2 * reach, level.height + 2 * reach)
-    images = pair.reference_patch(wide), pair.input_patch(level, transform)
+    images = pair.reference_patch(level.widened(reach)), pair.input_patch(level, transform)
     return find_stripes(*images, reach, elsewhere_px / factor, context).scaled(factor)
 
 

@@ -252,6 +252,18 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Mapping[str, An
         table.writerows(rows)
 
 
+def write_figure(path: Path, figure: Any, dpi: int) -> None:
+    """Write a figure of matplotlib as a PNG, without the name of what wrote it.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with writing(path):
+        figure.savefig(path, format="png", dpi=dpi, metadata={"Software": None})
+
+
 @contextlib.contextmanager
 def scratch_file(path: Path) -> Iterator[Path]:
     """Yield the name of a temporary file beside a staged output, and remove the file afterwards."""

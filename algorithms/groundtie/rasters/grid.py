@@ -208,6 +208,11 @@ class Grid:
         place = compose(self.transform, Affine.translation(col, row))
         return self.on_same_map(place, width, height)
 
+    def widened(self, margin_px: int) -> Grid:
+        """Return this grid with a margin on each side."""
+        both = 2 * margin_px
+        return self.window(-margin_px, -margin_px, self.width + both, self.height + both)
+
     def shifted(self, dx: float, dy: float) -> Grid:
         """Return this grid moved by map units."""
         place = compose(Affine.translation(dx, dy), self.transform)

@@ -14,7 +14,7 @@ from ..context import Context
 from ..geometry.limits import SearchLimits
 from ..pose.pose import Pose
 from ..pose.search import scan, shift_surface
-from ..rasters.atomic import writing
+from ..rasters.atomic import write_figure
 from ..rasters.patch import Patch
 from .pictures import grey_picture
 
@@ -64,8 +64,7 @@ def draw_rotation(
         _draw_image(
             axes[1, 1], checkerboard(reference, input, pose), "reference and input, in squares"
         )
-    with writing(path):
-        figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
+    write_figure(path, figure, 110)
 
 
 def checkerboard(reference: Patch, input: Patch, pose: Pose) -> NDArray[np.uint8]:

@@ -17,8 +17,6 @@ from .orientation import SCALES_PX, edge_strength, orientation_fields
 # the widest histogram kernel.
 BORDER_PX = 8
 
-_MARGIN_PX = reach()
-
 # Memory of a whole description: grey values and their validity, complex fields, strength and its
 # validity, bins.
 BYTES_A_PIXEL = 5 + 8 * len(SCALES_PX) + 5 + 1
@@ -33,7 +31,7 @@ class _Window:
 
     @cached_property
     def bins(self) -> NDArray[np.uint8]:
-        around = self.patch.inner(BORDER_PX - _MARGIN_PX)
+        around = self.patch.inner(BORDER_PX - reach())
         return to_bins(around.values, around.valid, self.bin_count)
 
     @cached_property
@@ -82,7 +80,7 @@ class Description:
     @property
     def bins(self) -> NDArray[np.uint8]:
         """Bins of the patch."""
-        return self._bins(self.border_px - BORDER_PX + _MARGIN_PX)
+        return self._bins(self.border_px - BORDER_PX + reach())
 
     @property
     def bins_around(self) -> NDArray[np.uint8]:

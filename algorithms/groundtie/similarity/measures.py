@@ -36,8 +36,8 @@ Measure = Callable[[Description, Description, Context | None], FloatArray]
 # Lanes and block length with which numpy sums along contiguous memory.
 _LANES, _PAIRWISE_BLOCK = 8, 128
 
-# Entropies below this hold rounding only.
-_NOTHING = 1e-9
+# Entropies, shares and variances below this hold rounding only.
+NOTHING = 1e-9
 
 
 def of_histograms(function: HistogramMeasure) -> Measure:
@@ -54,7 +54,7 @@ def of_histograms(function: HistogramMeasure) -> Measure:
 def normalized_mutual_information(histograms: Histograms) -> FloatArray:
     """Return Studholme's (H(A) + H(B)) / H(A, B), between 1 and 2 ([Suri2010] eq 3.21)."""
     a, b, ab = map(entropy, tables(histograms))
-    informative = ab > _NOTHING
+    informative = ab > NOTHING
     return np.where(informative, (a + b) / np.where(informative, ab, 1.0), 1.0)
 
 

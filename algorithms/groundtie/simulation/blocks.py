@@ -28,18 +28,9 @@ _ROOF_BOX_M = (2.5, 4.0)
 _LOT_M = 22.0
 
 
-@dataclass(frozen=True)
-class Building:
-    """A building, made of parts of which later ones are drawn over earlier ones.
-
-    Attributes
-    ----------
-    parts : tuple of (outline, height)
-        Outline in pixels, height of the roof above the ground in metres.
-    """
-
-    parts: tuple[tuple[Polygon, float], ...]
-
+# Parts of a building, later ones drawn over earlier ones: outline in pixels, and height of the roof
+# above the ground in metres.
+Building = list[tuple[Polygon, float]]
 
 Builder = Callable[[Polygon, float, np.random.Generator], list[Building]]
 
@@ -92,7 +83,7 @@ def perimeter(block: Polygon, scale: float, generator: np.random.Generator) -> l
                 buildings.append(_with_roof(house, height_m, scale, generator))
     back = fitted_rectangle(yard, (0.5, 0.3))
     if back is not None and generator.random() < 0.5:
-        buildings.append(Building(((back, generator.uniform(4, 10)),)))
+        buildings.append([(back, generator.uniform(4, 10))])
     return buildings
 
 
@@ -121,8 +112,8 @@ def towers(block: Polygon, scale: float, generator: np.random.Generator) -> list
         aside = [generator.uniform(-1, 1) * (h - r) for h, r in zip(half, reach, strict=True)]
         tower = rectangle(moved(centre, aside[0], aside[1], angle), (reach[0], reach[1]), angle)
         height_m = generator.uniform(25, HIGHEST_M - _ROOF_BOX_M[1])
-        parts = _with_roof(tower, height_m, scale, generator).parts
-        buildings.append(Building(((footprint, podium_m), *parts)))
+        parts = _with_roof(tower, height_m, scale, generator)
+        buildings.append([(footprint, podium_m), *parts])
     return buildings
 
 
@@ -177,7 +168,7 @@ def _with_roof(
         box = rectangle(moved(centre, u, v, angle), (size[0], size[1]), angle)
         if all(contains(outline, corner) for corner in box):
             parts.append((box, height_m + generator.uniform(*_ROOF_BOX_M)))
-    return Building(tuple(parts))
+    return parts
 
 
 def _at(side: tuple[Point, Point], share: float) -> Point:

@@ -157,12 +157,12 @@ class CityLayout(Canvas):
     def _put_up_buildings(self) -> None:
         keep_off = (Cover.WATER, Cover.RAIL, Cover.ASPHALT)
         for building in self._buildings:
-            outline, _ = building.parts[0]
+            outline, _ = building[0]
             if self._touches(outline, keep_off):
                 continue
             when = self.changes.draw()
             window_m = self.generator.uniform(*_WINDOW_M)
-            for part, height_m in building.parts:
+            for part, height_m in building:
                 roof = self.book.add(Cover.BUILDING, height_m, window_m=window_m)
                 self._things.append(Standing(part, roof, when))
 

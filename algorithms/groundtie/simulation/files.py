@@ -14,7 +14,7 @@ from ..rasters.atomic import Outputs, make_folder, write_csv, write_json, writin
 from ..rasters.grid import FloatArray
 from ..rasters.writing import write_raster
 from .metadata import optical_item, sar_item
-from .pair import SAR, SimulatedPair, scene_grid
+from .pair import SAR, SimulatedPair
 
 NAMES = {
     "reference": "reference.tif",
@@ -69,7 +69,7 @@ def write_pair(pair: SimulatedPair, folder: str | Path) -> dict[str, Path]:
         terrain = pair.scene.terrain_m[pair.scene.window]
         write_raster(staged["dem"], terrain[None], pair.reference_grid, ["Height of ground (m)"])
         surface, grid = pair.scene.surface_m, pair.reference_grid
-        around = scene_grid(grid, pair.scene.margin_px)
+        around = grid.widened(pair.scene.margin_px)
         write_raster(staged["dsm"], surface[None], around, ["Height of surface (m)"])
         if "input_dem" in staged:
             write_raster(staged["input_dem"], pair.assumed_m[None], around, ["Height taken (m)"])

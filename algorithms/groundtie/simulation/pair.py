@@ -156,7 +156,7 @@ def simulate_pair(options: PairOptions, progress: Progress = SILENT) -> Simulate
     progress.update(0.0, "laying out the scene")
     reach = object_reach_px(scene_options, options.sar, options.optical) + _error_reach_px(options)
     margin = in_steps(needed_margin(model, reference_grid, nominal) + reach)
-    around = scene_grid(reference_grid, margin)
+    around = reference_grid.widened(margin)
     require_memory(around, nominal, PAIR_BYTES)
     scenes = generate_scenes(scene_options, margin)
     assumed_m = _assumed_terrain(scenes.radar, options)
@@ -293,12 +293,6 @@ def map_grid(options: SceneOptions) -> Grid:
             "take smaller pixels, or fewer"
         )
     return grid
-
-
-def scene_grid(grid: Grid, margin_px: int) -> Grid:
-    """Return the grid of a scene that extends by a margin beyond its reference image."""
-    around = 2 * margin_px
-    return grid.window(-margin_px, -margin_px, grid.width + around, grid.height + around)
 
 
 def object_reach_px(scene: SceneOptions, sar: SarOptions, optical: OpticalOptions) -> int:

@@ -151,11 +151,6 @@ class Scenes(NamedTuple):
     camera: Scene
 
 
-def generate_scene(options: SceneOptions, margin_px: int = 0) -> Scene:
-    """Generate a scene as it is at the radar's acquisition; see `generate_scenes`."""
-    return generate_scenes(options, margin_px).radar
-
-
 def generate_scenes(options: SceneOptions, margin_px: int = 0) -> Scenes:
     """Generate a scene as it is at the radar's and at the camera's acquisition.
 

@@ -61,9 +61,9 @@ def write_sensor_image(made: SensorImage, folder: str | Path) -> dict[str, Path]
         write_raster(staged["reference"], made.reference[None], made.reference_grid, ["Amplitude"])
         write_raster(staged["image"], made.image, own, bands, rpc_tags=rpc_tags)
         heights = ["Height of ground above the ellipsoid (m)"]
-        write_raster(staged["dem"], made.terrain_m[None], made.terrain_grid, heights)
+        write_raster(staged["dem"], made.terrain.height_m[None], made.terrain.grid, heights)
         surface = ["Height of surface above the ellipsoid (m)"]
-        write_raster(staged["dsm"], made.surface_m[None], made.terrain_grid, surface)
+        write_raster(staged["dsm"], made.surface_m[None], made.terrain.grid, surface)
         sar, grid = made.options.sar, made.reference_grid
         write_json(staged["reference_metadata"], sar_item(NAMES["reference"], grid, sar))
         write_json(

@@ -21,7 +21,7 @@ from .held import SENSOR_BYTES, require_memory
 from .misregistration import Positions
 from .noise import strips
 from .optical import OpticalOptions
-from .pair import camera_image, in_steps, map_grid, object_reach_px, scene_grid
+from .pair import camera_image, in_steps, map_grid, object_reach_px
 from .sar import SarOptions, render_sar
 from .scene import SceneOptions, generate_scenes
 
@@ -87,13 +87,11 @@ class SensorImage:
         Error of the delivered RPCs.
     exact, delivered : RPCFit
         RPCs of the camera, without and with the error.
-    terrain_m : float32 array (rows, columns)
-        Height of the bare ground above the ellipsoid. It covers all ground that the image shows,
-        by its true and by its delivered geometry.
+    terrain : Terrain
+        The bare ground. It covers all ground that the image shows, by its true and by its delivered
+        geometry.
     surface_m : float32 array (rows, columns)
-        The same with buildings and trees.
-    terrain_grid : Grid
-        Georeferencing of both height models.
+        Heights on the terrain's grid with buildings and trees.
     check_points_px : float64 array (n, 2)
         Reference pixels (col, row) on open ground that the image shows.
     roof_points : RoofPoints
@@ -108,16 +106,14 @@ class SensorImage:
     error: AttitudeError
     exact: RPCFit
     delivered: RPCFit
-    terrain_m: npt.NDArray[np.float32]
+    terrain: Terrain
     surface_m: npt.NDArray[np.float32]
-    terrain_grid: Grid
     check_points_px: FloatArray
     roof_points: RoofPoints
 
     def ground_m(self, px: FloatArray) -> FloatArray:
         """Return the ground (x, y, height), shape (n, 3), of reference pixels (n, 2)."""
-        xy = self.reference_grid.pixel_to_map(px)
-        return Terrain(self.terrain_m, self.terrain_grid).under(xy)
+        return self.terrain.under(self.reference_grid.pixel_to_map(px))
 
 
 @dataclass(frozen=True)
@@ -168,7 +164,7 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
     error = AttitudeError.draw(options.attitude, size, pixel_m, scene_options.seed)
     progress.update(0.0, "laying out the scene")
     margin = _margin_px(options, grid, camera, error)
-    around = scene_grid(grid, margin)
+    around = grid.widened(margin)
     require_memory(around, grid, SENSOR_BYTES)
     scenes = generate_scenes(scene_options, margin)
     terrain = Terrain(scenes.radar.terrain_m + np.float32(GROUND_M), around)
@@ -190,9 +186,8 @@ def simulate_sensor_image(options: SensorOptions, progress: Progress = SILENT) -
         error=error,
         exact=exact,
         delivered=delivered,
-        terrain_m=terrain.height_m,
+        terrain=terrain,
         surface_m=scenes.radar.surface_m + np.float32(GROUND_M),
-        terrain_grid=terrain.grid,
         check_points_px=ground_points(scenes, grid, optical),
         roof_points=roof_points(scenes, grid, optical, options.sar, view),
     )

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..similarity.measures import (
+    NOTHING,
     FloatArray,
     HistogramMeasure,
     Histograms,
@@ -15,9 +16,6 @@ from ..similarity.measures import (
     normalized_mutual_information,
     tables,
 )
-
-# Shares and variances below this are rounding errors.
-_NOTHING = 1e-9
 
 
 def mutual_information(histograms: Histograms) -> FloatArray:
@@ -76,7 +74,7 @@ def cluster_reward(histograms: Histograms) -> FloatArray:
     """
     a, b, ab = (np.square(_shares(table)).sum(axis=-1) for table in tables(histograms))
     chance = np.sqrt(a * b)
-    informative = (chance > 0) & (chance < 1 - _NOTHING)
+    informative = (chance > 0) & (chance < 1 - NOTHING)
     chance = np.where(informative, chance, 0.5)
     return np.where(informative, (ab / chance - chance) / (1 - chance), 0.0)
 
@@ -94,7 +92,7 @@ def correlation_ratio(histograms: Histograms) -> FloatArray:
     mean = (sums.sum(axis=-1) / total)[..., None]
     explained = ((sums - mean * b) ** 2 / _at_least(b)).sum(axis=-1) / total
     variance = (a * (levels - mean) ** 2).sum(axis=-1) / total
-    informative = variance > _NOTHING
+    informative = variance > NOTHING
     return np.where(informative, explained / np.where(informative, variance, 1.0), 0.0)
 
 

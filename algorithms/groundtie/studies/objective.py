@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +18,7 @@ from ..pose.pose import Pose
 from ..rasters.patch import Patch
 from ..similarity.binning import MASKED, to_bins
 from ..similarity.correlation import MINIMUM_OVERLAP
-from ..similarity.joint_histogram import ORDER
+from ..similarity.joint_histogram import ORDER, count_joint_histograms
 from ..similarity.measures import HistogramMeasure
 from ..similarity.surface import SimilaritySettings
 from .histogramming import joint_histogram_under
@@ -80,12 +79,8 @@ class BinnedPair:
         image = _shifted(self.image, (right, down), self.template.shape)
         if template.size == 0:
             return self.nothing
-        # Masked pixels go into an extra bin that is dropped; OpenCV's own mask is much slower.
-        sizes = [count + 1 for count in self.counts]
-        pair = [np.minimum(template, self.counts[0]), np.minimum(image, self.counts[1])]
-        ranges = [0, sizes[0], 0, sizes[1]]
-        counted = cv2.calcHist(pair, [0, 1], None, sizes, ranges)
-        return self._similarity(counted[:-1, :-1].astype(np.float64))
+        counted = count_joint_histograms(template, image, self.counts)[0, 0]
+        return self._similarity(counted.astype(np.float64))
 
     def under(self, pose: Pose) -> float:
         """Return the similarity at any pose."""

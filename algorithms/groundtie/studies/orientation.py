@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +9,7 @@ from numpy.typing import NDArray
 
 from ..features.keypoints import Keypoints
 from ..features.sampling import sampled_gradient, square_samples
-from ..features.scale_space import (
-    Gradient,
-    GradientOperator,
-    differences,
-    gradients_at_scales,
-)
-from ..rasters.reading import FloatImage
+from ..features.scale_space import Gradient
 
 # Orientation: bins of its histogram, width of its window in scales, reach of the window in widths,
 # and least height of a further peak as a share of the highest.
@@ -51,39 +44,3 @@ def oriented(fields: Gradient, points: Keypoints) -> tuple[Keypoints, NDArray[np
     low, top, high = before[index, at], smooth[index, at], after[index, at]
     place = at + 0.5 * (low - high) / (low - 2 * top + high)
     return replace(points.take(index), orientation_rad=place * (2 * np.pi / _BINS)), index
-
-
-def describe_at_scales(
-    image: FloatImage,
-    valid: NDArray[np.bool_],
-    found: Keypoints,
-    describe: Callable[[Gradient, Keypoints], FloatImage],
-    length: int,
-    upright: bool,
-    gradient: GradientOperator = differences,
-) -> tuple[Keypoints, FloatImage]:
-    """Return keypoints, one for each orientation unless upright, and their descriptors.
-
-    Parameters
-    ----------
-    image, valid, found, gradient
-        As for `gradients_at_scales`.
-    describe
-        Returns the descriptors, shape (m, k), of m keypoints from the gradient at their scale. The
-        keypoints are given in pixels of that gradient.
-    length
-        Number of values of a descriptor.
-    upright
-        Whether keypoints keep the image's axes.
-    """
-    owners, tables = [np.zeros(0, int)], [Keypoints.none()]
-    descriptors = [np.zeros((0, length), np.float32)]
-    for owner, points, fields in gradients_at_scales(image, valid, found, gradient):
-        if not upright:
-            points, index = oriented(fields, points)
-            owner = owner[index]
-        owners.append(owner)
-        tables.append(replace(found.take(owner), orientation_rad=points.orientation_rad))
-        descriptors.append(describe(fields, points))
-    order = np.argsort(np.concatenate(owners), kind="stable")
-    return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]

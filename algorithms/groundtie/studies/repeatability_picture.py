@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..rasters.atomic import writing
+from ..rasters.atomic import write_figure
 from .evaluation import Evaluation
 from .repeatability import CLASS_NAMES
 
@@ -43,5 +43,4 @@ def draw_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
         xticklabels=CLASS_NAMES,
     )
     left.legend()
-    with writing(path):
-        figure.savefig(path, format="png", dpi=120, metadata={"Software": None})
+    write_figure(path, figure, 120)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from ..features.descriptors import LENGTH, sift_rows
 from ..features.detectors import SiftDetector, SiftOctDetector
 from ..features.keypoints import Keypoints
+from ..features.scale_space import gradients_at_scales
 from ..rasters.patch import Patch, has_negative
 from ..rasters.reading import FloatImage
 from ..similarity.orientation import compress
 from ..speckle.isef import isef
 from .gradients import DECAY, GRADIENTS, gradient_operator, needs_positive
-from .orientation import describe_at_scales
+from .orientation import oriented
 
 # Least contrast for the comparison of detectors. Without the octave that speckle dominates,
 # keypoints are weaker, and the inliers among them, too.
@@ -75,5 +76,15 @@ class SiftVariantDescriptor:
         self, image: FloatImage, valid: NDArray[np.bool_], found: Keypoints
     ) -> tuple[Keypoints, FloatImage]:
         """Describe keypoints of an image, without compressing its grey values."""
+        owners, tables = [np.zeros(0, int)], [Keypoints.none()]
+        descriptors = [np.zeros((0, LENGTH), np.float32)]
         operator = gradient_operator(self.gradient)
-        return describe_at_scales(image, valid, found, sift_rows, LENGTH, self.upright, operator)
+        for owner, points, fields in gradients_at_scales(image, valid, found, operator):
+            if not self.upright:
+                points, index = oriented(fields, points)
+                owner = owner[index]
+            owners.append(owner)
+            tables.append(replace(found.take(owner), orientation_rad=points.orientation_rad))
+            descriptors.append(sift_rows(fields, points))
+        order = np.argsort(np.concatenate(owners), kind="stable")
+        return Keypoints.concatenate(tables).take(order), np.concatenate(descriptors)[order]

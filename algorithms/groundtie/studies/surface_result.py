@@ -10,7 +10,7 @@ import numpy as np
 
 from ..context import Context
 from ..declaration import file_lines, given_files
-from ..rasters.atomic import Outputs, write_json, writing
+from ..rasters.atomic import Outputs, write_figure, write_json
 from ..rasters.grid import Grid
 from ..rasters.writing import write_raster
 from ..similarity.peak import Peak, find_peak
@@ -163,5 +163,4 @@ def _draw(path: Path, result: SurfaceResult) -> None:
     axes.legend(loc="upper right", framealpha=0.7)
     right, down = result.peak.shift_px
     axes.set_title(f"peak at {right:+.2f}, {down:+.2f} px, height {result.peak.height:.1f}")
-    with writing(path):
-        figure.savefig(path, format="png", dpi=150, metadata={"Software": None})
+    write_figure(path, figure, 150)
