@@ -306,10 +306,10 @@ def test_what_is_brighter_in_two_radar_images_is_not_all_that_matches(
 @pytest.mark.parametrize(
     ("heights", "chips", "is_refused"),
     [
-        ((1.7, 1.7), 49, True),
-        ((1.8,), 49, False),
-        ((1.7, 1.8), 49, False),
-        ((1.7, 1.7), 200, False),
+        ((1.4, 1.4), 49, True),
+        ((1.6,), 49, False),
+        ((1.4, 1.6), 49, False),
+        ((1.4, 1.4), 200, False),
     ],
 )
 def test_views_that_move_as_ground_leave_more_than_drawn_lines(

@@ -29,9 +29,9 @@ from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 LEAST_OF_REST = 1.0
 
 # Views of one camera are alike nearly everywhere. If a transform moves them as ground, they leave
-# 1.8 and more, or 0.36 of what matches as a whole; drawn content that a resampled map moves leaves
+# 1.6 and more, or 0.36 of what matches as a whole; drawn content that a resampled map moves leaves
 # up to 1.5, and 0.2 (suite margins, LATER).
-LEAST_OF_VIEW, VIEW_SHARE = 1.75, 0.3
+LEAST_OF_VIEW, VIEW_SHARE = 1.5, 0.3
 
 # What two radar images share may be most of what speckle leaves. Where it is as bright as what is
 # drawn, different grounds leave 0.01, correct transforms 0.97 and more (suite margins, LATER).
