@@ -37,7 +37,6 @@ from groundtie.registration.rules.survey import (
     deviations_of_unexplained,
     has_few_chips,
     height_of_else,
-    least_of_else,
 )
 from groundtie.registration.specification import COREGISTER, OPTICAL, SAR_SAR
 from groundtie.registration.verdict import refusals
@@ -154,17 +153,10 @@ def _fine_coherence(evidence: RegistrationEvidence) -> float:
     return same.fine_coherence if same.fine_coherence > same.coarse_coherence else 0.0
 
 
-def _height_of_else(are_views: bool) -> Callable[[RegistrationEvidence], float]:
-    """Return the statistic, over its limit, of moved views of one camera or of other images."""
-
-    def height_of(evidence: RegistrationEvidence) -> float:
-        rest = evidence.surveys.rest
-        if rest is None or rest.shared.is_moved_view != are_views:
-            return math.nan
-        height = height_of_else(rest) / max(least_of_else(evidence.surveys), 0.1)
-        return height if math.isfinite(height) else math.nan
-
-    return height_of
+def _height_of_else(evidence: RegistrationEvidence) -> float:
+    rest = evidence.surveys.rest
+    height = height_of_else(rest)
+    return height / rest.least if rest is not None and math.isfinite(height) else math.nan
 
 
 def _brighter(evidence: RegistrationEvidence) -> float:
@@ -214,8 +206,7 @@ STATISTICS = (
     Statistic("pixel-locked content: fine coherence", FINE_COHERENCE, _fine_coherence),
     Statistic("pixel-locked content: off what is drawn", 1.0, _off_drawn, False),
     Statistic("pixel-locked content: moved ground", MOVED_GROUND_SHARE, _moved_ground, False),
-    Statistic("nothing else in common: height", 1.0, _height_of_else(False), False),
-    Statistic("nothing else in common: height, views", 1.0, _height_of_else(True), False),
+    Statistic("nothing else in common: height", 1.0, _height_of_else, False),
     Statistic("nothing else in common: brighter", LEAST_BRIGHTER, _brighter),
     Statistic(
         "rest elsewhere: second peak",

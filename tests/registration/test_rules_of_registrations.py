@@ -37,9 +37,8 @@ from groundtie.masks.used import GROUND, LAYER, NONE, SURFACE, MaskUsed
 from groundtie.matching.band_shifts import BandShift
 from groundtie.matching.contrast_signs import ContrastSigns
 from groundtie.matching.parts import LEAST_EXCESS, Part
-from groundtie.matching.shared_content import Sensors, SharedContent
+from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, Survey
-from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import Evidence, ImagesEvidence, RegistrationEvidence
 from groundtie.registration.scene import SceneInfo
 from groundtie.registration.surface_masks import RENDERED_CORRELATION, ModelFit
@@ -299,25 +298,6 @@ def test_what_is_brighter_in_two_radar_images_is_not_all_that_matches(
     """Speckle and what is drawn leave hardly anything; bright ground leaves more."""
     left = survey(height=height, rival=0.1)
     rest = in_common(Sensors.RADARS, left, brighter=brighter)
-    found = evidence(GOOD, survey=survey(), rest=rest)
-    assert refusing(found) == ["nothing else in common"] * is_refused
-
-
-@pytest.mark.parametrize(
-    ("heights", "chips", "is_refused"),
-    [
-        ((1.4, 1.4), 49, True),
-        ((1.6,), 49, False),
-        ((1.4, 1.6), 49, False),
-        ((1.4, 1.4), 200, False),
-    ],
-)
-def test_views_that_move_as_ground_leave_more_than_drawn_lines(
-    heights: tuple[float, ...], chips: int, is_refused: bool
-) -> None:
-    """Unless copies leave too few chips."""
-    shared = SharedContent(VIEWS, Sensors.CAMERAS, off_drawn=2.0)
-    rest = Rest(shared, chips, *(survey(height=height) for height in heights))
     found = evidence(GOOD, survey=survey(), rest=rest)
     assert refusing(found) == ["nothing else in common"] * is_refused
 

@@ -109,11 +109,8 @@ class SharedContent:
 
     @property
     def may_be_drawn(self) -> bool:
-        """Whether drawn content may be all that matches, although it is not evident.
-
-        Whoever resamples a map may move its layers as no other drawn content is moved.
-        """
-        return self.is_moved_view or not (self.is_evident or self.is_explained)
+        """Whether drawn content may be all that matches, although it is not evident."""
+        return not (self.is_evident or self.is_explained)
 
     @property
     def is_explained(self) -> bool:

@@ -28,11 +28,6 @@ from .survey import SURVEY_RADIUS_PX, Survey, survey_model, survey_places
 # different ground mostly up to 0.8.
 LEAST_OF_REST = 1.0
 
-# Views of one camera are alike nearly everywhere. If a transform moves them as ground, they leave
-# 1.6 and more, or 0.36 of what matches as a whole; drawn content that a resampled map moves leaves
-# up to 1.5, and 0.2 (suite margins, LATER).
-LEAST_OF_VIEW, VIEW_SHARE = 1.5, 0.3
-
 # What two radar images share may be most of what speckle leaves. Where it is as bright as what is
 # drawn, different grounds leave 0.01, correct transforms 0.97 and more (suite margins, LATER).
 LEAST_OF_RADARS = 0.5
@@ -65,9 +60,7 @@ class Rest:
     @property
     def least(self) -> float:
         """The height that one of both surveys should reach."""
-        if self.shared.sensors is Sensors.RADARS:
-            return LEAST_OF_RADARS
-        return LEAST_OF_VIEW if self.shared.is_moved_view else LEAST_OF_REST
+        return LEAST_OF_RADARS if self.shared.sensors is Sensors.RADARS else LEAST_OF_REST
 
 
 @dataclass(frozen=True)
@@ -223,7 +216,7 @@ def survey_rest(
     -------
     The result; None where no such content is looked for. It has no survey where there is hardly
     any identical content, unless both are radar images, in which speckle blurs it; nor where the
-    content is drawn; nor where the images are copies or unmoved views that hide nothing.
+    content is drawn; nor where the images are copies or views that hide nothing.
     """
     if kinds.sensors is None:
         return None
@@ -235,7 +228,6 @@ def survey_rest(
         return None
     shared = locked.shared
     are_radars = kinds.sensors is Sensors.RADARS
-    are_cameras = kinds.sensors is Sensors.CAMERAS and not kinds.may_be_different
     # A mask leaves little content, most of which a single measure would miss.
     fused = replace(matcher, settings=SimilaritySettings())
     # The mask of the reference depends on the input, so descriptions cannot be reused.
@@ -245,12 +237,12 @@ def survey_rest(
         return survey_model(fused, on_level, places, elsewhere_px, once, mask)
 
     rest = Rest(shared, len(places.centres))
-    if shared.is_drawn or (shared.is_moved_view and not are_cameras):
+    if shared.is_drawn:
         return rest
     if not shared.may_be_drawn:
         is_asked = shared.is_evident and (not shared.is_explained or shared.may_hide_ground)
         return replace(rest, survey=left_without(locked)) if is_asked else rest
-    is_low = are_cameras
+    is_low = kinds.sensors is Sensors.CAMERAS and not kinds.may_be_different
     if shared.sameness.covers_some or are_radars:
         left = left_without(locked)
         rest = replace(rest, survey=left)

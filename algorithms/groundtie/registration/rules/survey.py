@@ -10,14 +10,7 @@ from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
 from ...matching.parts import CANOPIES_PX, CANOPIES_SHARE, ELSEWHERE_PX, LEAST_EXCESS
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ...matching.surveys import (
-    LEAST_OF_RADARS,
-    LEAST_OF_REST,
-    LEAST_OF_VIEW,
-    VIEW_SHARE,
-    Rest,
-    Surveys,
-)
+from ...matching.surveys import LEAST_OF_RADARS, LEAST_OF_REST, Rest, Surveys
 from ...similarity.in_common import LEAST_BRIGHTER, MOVED_GROUND_SHARE
 from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
@@ -177,7 +170,7 @@ def _locked(evidence: RegistrationEvidence) -> str | None:
     if rest.shared.is_drawn:
         return "both images have the same drawn edges, sharper than the ground's or side by side"
     left = rest.survey
-    if left is None or rest.shared.is_moved_view or _confirms(left, rest):
+    if left is None or _confirms(left, rest):
         return None
     return (
         "without the content that both images share pixel by pixel, only "
@@ -230,35 +223,23 @@ def height_of_else(rest: Rest | None) -> float:
     """Return the mean similarity of chips without the content that both images share.
 
     Of the surveys without shared windows and without shared edges, the higher; of what may be
-    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made, views of the
-    ground leave too few chips, or what two radar images share is no brighter than the rest.
+    clouds, whose soft edges hardly coincide, the former. Infinite if neither was made, or what two
+    radar images share is no brighter than the rest.
     """
     if rest is None or not rest.shared.may_be_drawn:
         return math.inf
-    shared, ways = rest.shared, [rest.survey, rest.without_edges]
-    if shared.sameness.may_be_clouds and rest.survey is not None:
+    ways = [rest.survey, rest.without_edges]
+    if rest.shared.sameness.may_be_clouds and rest.survey is not None:
         ways = [rest.survey]
-    elif shared.sensors is Sensors.RADARS:
+    elif rest.shared.sensors is Sensors.RADARS:
         return math.inf
-    made = [left for left in ways if left is not None]
-    if shared.is_moved_view and any(has_few_chips(left, rest.chips) for left in made):
-        return math.inf
-    return max((left.height for left in made), default=math.inf)
-
-
-def least_of_else(surveys: Surveys) -> float:
-    """Return the limit of `height_of_else`; views that match weakly leave less."""
-    whole, rest = surveys.whole, surveys.rest
-    if whole is None or rest is None:
-        return 0.0
-    share = VIEW_SHARE if rest.shared.is_moved_view else math.inf
-    return min(rest.least, share * whole.height)
+    return max((left.height for left in ways if left is not None), default=math.inf)
 
 
 def _nothing_else(evidence: RegistrationEvidence) -> str | None:
-    surveys = evidence.surveys
-    height = height_of_else(surveys.rest)
-    if evidence.mask.leaves_little or height >= least_of_else(surveys):
+    rest = evidence.surveys.rest
+    height = height_of_else(rest)
+    if evidence.mask.leaves_little or rest is None or height >= rest.least:
         return None
     return (
         "without the content that both images share pixel by pixel, chips all over hardly match: "
@@ -395,9 +376,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
         "vary alike and without the surroundings of edges that coincide; if what varies alike is "
         f"brighter by {LEAST_BRIGHTER:g} standard deviations, as clouds are, without these windows "
-        f"alone. Of two radar images, only in the latter case, below {LEAST_OF_RADARS:g}; of views "
-        f"that are displaced as ground, below {LEAST_OF_VIEW:g} and below {VIEW_SHARE:g} of the "
-        f"whole. Asked {UNMASKED}, and not of copies and other views of one camera",
+        f"alone. Of two radar images, only in the latter case, below {LEAST_OF_RADARS:g}. Asked "
+        f"{UNMASKED}, and not of copies and views of one camera",
         "suites real, margins and attacks",
         WITHOUT,
         _nothing_else,
