@@ -17,7 +17,7 @@ from groundtie.matching.locked import EXACT_PX
 from groundtie.matching.parts import ELSEWHERE_PX, Part
 from groundtie.matching.shared_content import ImageKinds, Sensors
 from groundtie.matching.survey import SURVEY_RADIUS_PX, survey_places
-from groundtie.matching.surveys import LEAST_OF_REST, Rest, Surveys, survey_all
+from groundtie.matching.surveys import LEAST_BY_ONE_WAY, LEAST_OF_REST, Rest, Surveys, survey_all
 from groundtie.rasters.grid import Grid
 from groundtie.rasters.pair import Image, make_pair
 from groundtie.rasters.reading import open_raster
@@ -368,3 +368,23 @@ def test_what_two_sensors_have_in_common_is_looked_behind(
     # A survey above the limit without windows needs no second match.
     assert (rest.without_edges is None) == is_one_place
     assert is_one_place or rest.without_edges.height > rest.survey.height
+
+
+@pytest.mark.parametrize("is_one_place", [True, False])
+@pytest.mark.slow
+def test_two_cameras_have_more_in_common_than_a_thin_watermark(
+    is_one_place: bool, tmp_path: Path, context: Context
+) -> None:
+    """Its thin letters move no window; the place is shown in inverted contrast, or another is."""
+    offset = 0.4, -0.3
+    letters = np.zeros((SIDE, SIDE))
+    for top in range(20, SIDE - 20, 30):
+        for left in range(20 + top % 17, SIDE - 20, 30):
+            letters[top : top + 8, left] = letters[top, left : left + 6] = 3.0
+    letters = ndimage.gaussian_filter(letters, 1.2)
+    ground = -place() if is_one_place else place()[::-1]
+    input = ndimage.shift(ground + letters, offset[::-1], mode="mirror")
+    views = noisy(place() + letters, 1, 0.4), noisy(input, 2, 0.4)
+    rest = rest_of(tmp_path, *views, context, offset)
+    assert rest is not None and rest.survey is None and rest.without_edges is not None
+    assert (rest.without_edges.height >= LEAST_BY_ONE_WAY) == is_one_place

@@ -302,6 +302,15 @@ def test_what_is_brighter_in_two_radar_images_is_not_all_that_matches(
     assert refusing(found) == ["nothing else in common"] * is_refused
 
 
+@pytest.mark.parametrize(("height", "is_refused"), [(0.49, True), (0.51, False)])
+def test_a_thin_watermark_is_not_all_that_matches(height: float, is_refused: bool) -> None:
+    """So little varies alike that only the edges are left out."""
+    rest = replace(in_common(Sensors.CAMERAS, survey()), survey=None)
+    rest = replace(rest, without_edges=survey(height=height, rival=0.1))
+    found = evidence(GOOD, survey=survey(), rest=rest)
+    assert refusing(found) == ["nothing else in common"] * is_refused
+
+
 @pytest.mark.parametrize(
     ("chips", "height", "is_refused"),
     [(49, 1.9, True), (49, 2.1, False), (190, 1.9, True), (200, 1.9, False)],

@@ -10,7 +10,7 @@ from ...matching.locked import EXACT_PX, NOMINAL_PX, WHOLE_TIMES_EXACT
 from ...matching.parts import CANOPIES_PX, CANOPIES_SHARE, ELSEWHERE_PX, LEAST_EXCESS
 from ...matching.shared_content import Sensors
 from ...matching.survey import SURVEY_RADIUS_PX, Survey
-from ...matching.surveys import LEAST_OF_RADARS, LEAST_OF_REST, Rest, Surveys
+from ...matching.surveys import LEAST_BY_ONE_WAY, LEAST_OF_REST, Rest, Surveys
 from ...similarity.in_common import LEAST_BRIGHTER, MOVED_GROUND_SHARE
 from ...similarity.unexplained import WINDOW_PX
 from ..evidence import RegistrationEvidence
@@ -376,7 +376,8 @@ SURVEY_RULES: tuple[Rule, ...] = (
         f"{LEAST_OF_REST:g} robust standard deviation of one surface, both without windows that "
         "vary alike and without the surroundings of edges that coincide; if what varies alike is "
         f"brighter by {LEAST_BRIGHTER:g} standard deviations, as clouds are, without these windows "
-        f"alone. Of two radar images, only in the latter case, below {LEAST_OF_RADARS:g}. Asked "
+        f"alone. Below {LEAST_BY_ONE_WAY:g} of two radar images, in the latter case only, and, "
+        "without edges, of two camera images in which hardly anything varies alike. Asked "
         f"{UNMASKED}, and not of copies and views of one camera",
         "suites real, margins and attacks",
         WITHOUT,
