@@ -375,7 +375,7 @@ def test_what_two_sensors_have_in_common_is_looked_behind(
 def test_two_cameras_have_more_in_common_than_a_thin_watermark(
     is_one_place: bool, tmp_path: Path, context: Context
 ) -> None:
-    """Its thin letters move no window; the place is shown in inverted contrast, or another is."""
+    """Few windows vary alike; beneath is one place in inverted contrast, or another place."""
     offset = 0.4, -0.3
     letters = np.zeros((SIDE, SIDE))
     for top in range(20, SIDE - 20, 30):
