@@ -56,6 +56,16 @@ def test_a_ratio_keeps_what_is_clearly_nearest() -> None:
     assert found.ratio.max() <= 0.5
 
 
+def test_mutual_matches_are_each_other_s_nearest() -> None:
+    first, second = rows(80, 1), rows(60, 2)
+    found = match(first, second, mutual=True, method="exact")
+    distance = np.linalg.norm(first[:, None] - second[None], axis=2)
+    expected = [
+        (i, j) for i, j in enumerate(distance.argmin(axis=1)) if distance[:, j].argmin() == i
+    ]
+    assert list(zip(found.first, found.second, strict=True)) == expected
+
+
 def test_of_two_equal_partners_the_ratio_is_the_largest() -> None:
     one = rows(1, 1)
     twice = match(one, np.concatenate([one, one]), method="exact")
@@ -65,7 +75,8 @@ def test_of_two_equal_partners_the_ratio_is_the_largest() -> None:
 @pytest.mark.parametrize("counts", [(0, 5), (5, 0), (0, 0)])
 def test_nothing_matches_nothing(counts: tuple[int, int]) -> None:
     first, second = rows(counts[0], 1), rows(counts[1], 2)
-    assert len(match(first, second)) == 0
+    for mutual in (False, True):
+        assert len(match(first, second, mutual=mutual)) == 0
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -27,6 +27,7 @@ def match(
     first: Descriptors,
     second: Descriptors,
     ratio: float = 1.0,
+    mutual: bool = False,
     method: str = "kd-tree",
 ) -> Matches:
     """Match keypoints by their descriptors alone.
@@ -38,11 +39,17 @@ def match(
     ratio
         Largest ratio of the distances to the nearest and to the second-nearest partner; at 1 each
         keypoint keeps its nearest partner.
+    mutual
+        Whether both keypoints of a match must be each other's nearest.
     method
         "exact", or "kd-tree" for an approximate search by a forest of k-d trees.
     """
     found = Matches.of(_nearest(first, second, method))
-    return found.take(found.ratio <= ratio)
+    found = found.take(found.ratio <= ratio)
+    if not mutual:
+        return found
+    back = _nearest(second, first, method).index
+    return found.take(back[found.second] == found.first)
 
 
 def filter_matches(
