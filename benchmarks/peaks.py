@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from groundtie.context import threads
 from groundtie.geometry.limits import SearchLimits
-from groundtie.pose.pose import Pose
 from groundtie.rasters.patch import Patch
 from groundtie.similarity.binning import MASKED, to_bins
 from groundtie.similarity.joint_histogram import (
@@ -354,18 +353,16 @@ def measure_climbs(pair: Aligned, quick: bool) -> list[dict[str, Any]]:
     right, down = map(int, rng.integers(-_OFF_CENTRE_PX, _OFF_CENTRE_PX + 1, 2))
     windows = pair.windows((right, down), RADIUS_PX)
     peak = exhaustive_peak(*windows)
-    seeds = rng.integers(-RADIUS_PX, RADIUS_PX + 1, (RUNS, 2)).astype(float)
     records = []
     for name, search in SEARCHES.items():
         discrete = name == DISCRETE
         runs = RUNS if discrete and not quick else CONTINUOUS_RUNS
         reached, evaluations, seconds = [], [], []
-        for number, (x, y) in enumerate(seeds[:runs].tolist()):
-            effort = replace(search.effort, start=Pose(shift_px=(x, y)))
+        for number in range(runs):
+            # The seed draws where the search starts.
             with threads(1, seed=number) as context:
                 started = time.perf_counter()
-                climbing = replace(search, effort=effort)
-                found = climbing(*windows, SearchLimits(RADIUS_PX), CLIMBED, context)[0]
+                found = search(*windows, SearchLimits(RADIUS_PX), CLIMBED, context)[0]
                 seconds.append(time.perf_counter() - started)
             distance_px = np.abs(np.subtract(found.pose.shift_px, peak)).max()
             reached.append(bool(distance_px <= (0 if discrete else _SAME_PX)))
