@@ -21,7 +21,7 @@ from groundtie.kinds import plain
 from groundtie.matching.parts import LEAST_EXCESS, find_parts
 from groundtie.matching.shared_content import Sensors
 from groundtie.matching.survey import Survey
-from groundtie.matching.surveys import LEAST_OF_REST, Rest
+from groundtie.matching.surveys import Rest
 from groundtie.registration.evidence import RegistrationEvidence
 from groundtie.registration.registration import Registration
 from groundtie.registration.rules.survey import (
@@ -164,7 +164,7 @@ def _brighter(evidence: RegistrationEvidence) -> float:
     rest = evidence.surveys.rest
     if rest is None or rest.survey is None or not math.isfinite(height_of_else(rest)):
         return math.nan
-    is_low = rest.survey.height < LEAST_OF_REST
+    is_low = rest.survey.height < rest.least
     return rest.shared.sameness.brighter if is_low else math.nan
 
 

@@ -247,9 +247,11 @@ def survey_rest(
     if not shared.may_be_drawn:
         is_asked = shared.is_evident and (not shared.is_explained or shared.may_hide_ground)
         return replace(rest, survey=left_without(locked)) if is_asked else rest
-    is_low = kinds.sensors is Sensors.CAMERAS and not kinds.may_be_different
+    needs_edges = kinds.sensors is Sensors.CAMERAS and not kinds.may_be_different
     if shared.sameness.covers_some or are_radars:
         left = left_without(locked)
         rest = replace(rest, survey=left)
-        is_low = left.height < rest.least and not are_radars
-    return replace(rest, without_edges=left_without(locked.around_edges)) if is_low else rest
+        needs_edges = left.height < rest.least and not are_radars
+    if not needs_edges:
+        return rest
+    return replace(rest, without_edges=left_without(locked.around_edges))

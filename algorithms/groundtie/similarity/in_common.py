@@ -78,7 +78,7 @@ _LEAST_LEFT = 0.1
 # (suite margins, --seeds 87000-87029 --sample 120). Clouds, snow and waters that are inserted into
 # both images with such a transform reach as much as ground. So do soft lines on screenshots that
 # are placed by hand, over two places: without them, chips are as dissimilar as those of two dates
-# of which half the land changed (height 0.1 to 1.4; suite margins, "two dates of one camera").
+# of which half the land changed (suite attacks, controls "two dates of one camera").
 MOVED_GROUND_SHARE = 0.15
 
 # Clouds are brighter than the ground. Suite margins (`--classes "soft clouds" "cloud deck" controls
